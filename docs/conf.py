@@ -32,6 +32,7 @@ exclude_patterns = [".*", "build", "cases", "codegen", "results", "runtime", "sr
 default_role = "literal"
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", ".*")]
+suppress_warnings = ["ref.python"]  # attributes of one name in several classes
 """Types of other packages have no page here; links in the text are checked by MyST."""
 
 myst_enable_extensions = ["dollarmath"]

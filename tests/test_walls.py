@@ -191,7 +191,7 @@ def test_building_loads_no_sympy() -> None:
 
 
 def test_public_names() -> None:
-    own = ["SoftehlError", "load_kernel"]
+    own = ["SoftehlError", "SymPyNeededError", "UnknownNameError", "load_kernel"]
     assert sorted([*softehl._PUBLIC, *softehl._MODELLING, *own]) == softehl.__all__
     for name in softehl.__all__:
         assert getattr(softehl, name).__name__.rpartition(".")[2] in (name, "run", "Seal")

@@ -76,7 +76,10 @@ class PointForm:
 
 @dataclass(frozen=True)
 class Definition:
-    """A finished model: everything the compiler needs, nothing differentiated yet."""
+    """A finished model: arguments, potential and fields as graphs, nothing differentiated yet.
+
+    Made by `Model.finish`; `softehl.load_kernel` and `Study.add` take it.
+    """
 
     name: str
     doc: str
@@ -131,19 +134,22 @@ class Definition:
 
     @property
     def coordinate_width(self) -> int:
-        """Coordinates of one element: components times nodes."""
+        """Number of coordinates of one element, components times nodes."""
         return len(self.coordinates) * self.nodes
 
     @property
     def conservative(self) -> bool:
-        """True when the residual is the gradient of the potential (no exceptions)."""
+        """True if the residual is the gradient of the potential."""
         return not self.constant and not self.given
 
     def for_derivatives(self) -> Definition:
-        """The model of what derivatives of results are made of, along any variation.
+        """Return the model from which derivatives of results are computed, along any variation.
 
-        It has the tasks `pseudo_load` and, where there are fields, `fields_rate` alone. Its point
-        data are those of this model, then the rate of each.
+        Returns
+        -------
+        Definition
+            With the tasks `pseudo_load` and, if there are fields, `fields_rate`. Its point data are
+            those of this model, then the rate of each.
         """
         rates = tuple(Argument(f"rate_{a.name}", f"rate of {a.name}") for a in self.point_data)
         return replace(

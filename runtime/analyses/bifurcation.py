@@ -13,7 +13,7 @@ from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.constraints import Constraints, symmetric
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
-from softehl.runtime.results.result import Result, Shape
+from softehl.runtime.results.result import ModeShape, Result
 from softehl.runtime.solve.eigen import nearest_zero
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Branch, Point
@@ -23,8 +23,8 @@ _LOCATED = 1e-9
 """Of the load factor: a bifurcation is located where the next step is shorter."""
 
 
-class Blind(RuntimeWarning):
-    """Bifurcations are looked for where they cannot be seen."""
+class MissedBifurcations(RuntimeWarning):
+    """Bifurcations of a path are not detected: its tangent is unsymmetric or singular."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Bifurcation:
     ----------
     state : Result
         The result there.
-    mode : Shape
+    mode : ModeShape
         Direction of the other branch, 1 at its largest displacement.
     directions : int
         Number of directions that lost or gained stability in this step.
@@ -44,7 +44,7 @@ class Bifurcation:
     """
 
     state: Result
-    mode: Shape
+    mode: ModeShape
     directions: int
     located: bool
 
@@ -60,7 +60,7 @@ class Bifurcation:
     @property
     def reversed(self) -> Bifurcation:
         """The same state with the opposite direction of the other branch."""
-        return replace(self, mode=Shape.of(self.state, -self.mode.x))
+        return replace(self, mode=ModeShape.of(self.state, -self.mode.x))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ class Detector:
                 warn(
                     f"no symmetric, regular tangent at load factor {after.t:.4g} (friction, "
                     "contact, follower loads): bifurcations of such a path are not seen",
-                    Blind,
+                    MissedBifurcations,
                     stacklevel=2,
                 )
             return
@@ -143,7 +143,7 @@ class Detector:
         solution = replace(before.point.solution, x=near.x)
         state = Result(self.system, problem, Point(near.t, solution), before.histories)
         mode = near.mode / np.abs(displacements(self.system, near.mode)).max()
-        return Bifurcation(state, Shape.of(state, mode), directions, located)
+        return Bifurcation(state, ModeShape.of(state, mode), directions, located)
 
 
 def place(problem: Problem, t: float, x: Array) -> Place:

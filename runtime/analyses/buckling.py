@@ -12,7 +12,7 @@ from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.eigenproblems import buckled
 from softehl.runtime.equations.rigid_body_modes import require_held
 from softehl.runtime.equations.system import System
-from softehl.runtime.results.result import Result, Shape
+from softehl.runtime.results.result import ModeShape, Result
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
 from softehl.runtime.suggestions import few
@@ -26,12 +26,12 @@ class Buckling:
     ----------
     factors : array (k,)
         Critical load factors, rising.
-    shapes : tuple of Shape
+    shapes : tuple of ModeShape
         A Result for each, whose unknowns are the mode, 1 at its largest.
     """
 
     factors: Array
-    shapes: tuple[Shape, ...]
+    shapes: tuple[ModeShape, ...]
 
     def __repr__(self) -> str:
         """Summary in one line."""
@@ -54,4 +54,4 @@ def linear_buckling(system: System, start: Beginning, count: int, newton: Newton
     point = Point(t, solution)
     state = Result(system, problem, point, histories)
     factors, modes = buckled(system, problem_at, point, count, newton)
-    return Buckling(read_only(factors), tuple(Shape.of(state, mode) for mode in modes))
+    return Buckling(read_only(factors), tuple(ModeShape.of(state, mode) for mode in modes))

@@ -20,10 +20,23 @@ OnStep = Callable[[Result], object]
 
 @dataclass(eq=False)
 class Series:
-    """A `.pvd` file that names a `.vtu` file for each result, whole at any moment.
+    """A `.pvd` file that names a `.vtu` file for each result, complete at any moment.
 
-    part.pvd names part_0001.vtu, ... beside it. Given as `on_step` of a study's path, or as its
-    `write`. since: results up to there that the file names already are kept (a march that goes on).
+    Given as `write` or `on_step` of a path: part.pvd names part_0001.vtu, ... beside it.
+
+    Parameters
+    ----------
+    path : str or Path
+        The .pvd file.
+    since : float, optional
+        Results up to this load factor or time that the file names are kept.
+    entries : list of tuple
+        Load factor or time, and file, of each result.
+
+    Raises
+    ------
+    StudyError
+        The name does not end in .pvd, or the file cannot be written.
     """
 
     path: Path

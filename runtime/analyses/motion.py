@@ -251,7 +251,7 @@ def parameter_work(
 
 
 class EnergyGain(RuntimeWarning):
-    """The scheme has added energy to a motion."""
+    """The time integrator adds energy to a motion."""
 
 
 @dataclass

@@ -51,11 +51,21 @@ class Memo:
 
 @dataclass(eq=False)
 class Assembler:
-    """Blocks of elements and the pattern they share.
+    """Blocks of elements with a common sparsity pattern.
 
-    Parameters are given block by block, in the kernel's order; a block without parameters is
-    switched off, its place in the pattern stays. Results depend on the arguments alone; `memo` is
-    the one field that changes with calls.
+    Parameters are given block by block; a block without parameters is switched off, and keeps its
+    place in the pattern.
+
+    Attributes
+    ----------
+    size : int
+        Number of unknowns.
+    blocks : tuple of ElementBlock
+        The elements.
+    structure : Structure
+        The pattern, made when it is needed.
+    memo : Memo
+        Intermediate results; saves time only.
     """
 
     size: int
@@ -73,9 +83,24 @@ class Assembler:
 
     @classmethod
     def build(cls, size: int, blocks: Sequence[ElementBlock]) -> Assembler:
-        """Assembler of blocks over `size` unknowns.
+        """Make an assembler.
 
-        Raises ValueError if two blocks share a name, and for elements that are inside out.
+        Parameters
+        ----------
+        size : int
+            Number of unknowns.
+        blocks : sequence of ElementBlock
+            The elements.
+
+        Returns
+        -------
+        Assembler
+            The assembler.
+
+        Raises
+        ------
+        ValueError
+            Two blocks have the same name, or an element is inverted.
         """
         names = [block.name for block in blocks]
         if len(set(names)) < len(names):
@@ -86,11 +111,27 @@ class Assembler:
 
     @property
     def pattern(self) -> Pattern:
-        """Sparsity of the tangent, and where every element entry goes in it."""
+        """Sparsity of the tangent, and positions of the element entries."""
         return self.structure.pattern
 
     def block(self, name: str) -> ElementBlock:
-        """The block of that name; KeyError if there is none."""
+        """Return the block of a name.
+
+        Parameters
+        ----------
+        name : str
+            Its name.
+
+        Returns
+        -------
+        ElementBlock
+            The block.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such block; a KeyError.
+        """
         for block in self.blocks:
             if block.name == name:
                 return block
@@ -101,19 +142,58 @@ class Assembler:
     def with_data(
         self, name: str, *, data: Array | None = None, point_data: Array | None = None
     ) -> Assembler:
-        """The assembler with other data of one block; the pattern is shared."""
+        """Return the assembler with other data of one block.
+
+        Parameters
+        ----------
+        name : str
+            Name of the block.
+        data : array (n, k), optional
+            Data of each element.
+        point_data : array (n, points, k), optional
+            Values at the quadrature points.
+
+        Returns
+        -------
+        Assembler
+            With the same pattern.
+        """
         changed = replace(self.block(name), data=data, point_data=point_data)
         blocks = tuple(changed if b.name == name else b for b in self.blocks)
         return replace(self, blocks=blocks, memo=self.memo.without(name))
 
     def since(self, x: Array) -> Assembler:
-        """The assembler in the step after x; see `ElementBlock.since`."""
+        """Return the assembler in the next step; see `ElementBlock.since`.
+
+        Parameters
+        ----------
+        x : array (size,)
+            Unknowns at the end of the previous step.
+
+        Returns
+        -------
+        Assembler
+            With the same pattern.
+        """
         blocks = tuple(block.since(x) for block in self.blocks)
         changed = any(new is not old for new, old in zip(blocks, self.blocks, strict=True))
         return replace(self, blocks=blocks) if changed else self
 
     def residual(self, x: Array, parameters: Mapping[str, Array]) -> Array:
-        """Sum of the element residuals, (size,)."""
+        """Return the sum of the element residuals.
+
+        Parameters
+        ----------
+        x : array (size,)
+            Unknowns.
+        parameters : mapping of str to array (k,)
+            Block -> parameters.
+
+        Returns
+        -------
+        array (size,)
+            Residual.
+        """
         total = np.zeros(self.size)
         for block in self.blocks:
             if block.name in parameters:
@@ -121,9 +201,21 @@ class Assembler:
         return total
 
     def residual_and_size(self, x: Array, parameters: Mapping[str, Array]) -> tuple[Array, Array]:
-        """Sum of the element residuals, and of their magnitudes: both (size,).
+        """Return the sums of the element residuals and of their magnitudes.
 
-        At an equilibrium the second is the size of the loads, reactions and internal forces.
+        Parameters
+        ----------
+        x : array (size,)
+            Unknowns.
+        parameters : mapping of str to array (k,)
+            Block -> parameters.
+
+        Returns
+        -------
+        residual : array (size,)
+            Residual.
+        size : array (size,)
+            Sum of magnitudes: at an equilibrium the size of loads, reactions and internal forces.
         """
         total, size = np.zeros(self.size), np.zeros(self.size)
         for block in self.blocks:
@@ -134,11 +226,33 @@ class Assembler:
         return total, size
 
     def loose(self, names: Iterable[str]) -> Integers:
-        """Unknowns that no element of the blocks of these names has, rising."""
+        """Return the unknowns that no element of some blocks has.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Names of the blocks.
+
+        Returns
+        -------
+        array of int
+            Numbers, rising.
+        """
         return np.flatnonzero(self.counts(names) == 0)
 
     def counts(self, names: Iterable[str]) -> Integers:
-        """Number of elements of the blocks of these names that have each unknown, (size,)."""
+        """Return the number of elements of some blocks that have each unknown.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Names of the blocks.
+
+        Returns
+        -------
+        array of int (size,)
+            Numbers of elements.
+        """
         key = frozenset(names)
         if key not in self.memo.counts:
             found = np.zeros(self.size, dtype=np.int64)
@@ -149,8 +263,19 @@ class Assembler:
         return self.memo.counts[key]
 
     def around(self, values: Array, names: Iterable[str]) -> Array:
-        """For each unknown the sum of values (size,) over all unknowns of the elements that it is
-        in, of the blocks of these names: (size,).
+        """Return for each unknown the sum of values over all unknowns of its elements.
+
+        Parameters
+        ----------
+        values : array (size,)
+            Values.
+        names : iterable of str
+            Names of the blocks.
+
+        Returns
+        -------
+        array (size,)
+            Sums.
         """
         found, chosen = np.zeros(self.size), frozenset(names)
         for block in self.blocks:
@@ -160,10 +285,13 @@ class Assembler:
         return found
 
     def reach(self) -> Array:
-        """Largest coordinate of the elements that each unknown occurs in, (size,).
+        """Return the largest coordinate of the elements of each unknown.
 
-        Kernels that add displacements to coordinates lose a displacement in the rounding of
-        this number.
+        Returns
+        -------
+        array (size,)
+            Kernels that add displacements to coordinates lose digits of a displacement in the
+            rounding of this number.
         """
         if self.memo.reach is None:
             reach = np.zeros(self.size)
@@ -177,7 +305,20 @@ class Assembler:
         return self.memo.reach
 
     def not_finite(self, x: Array, parameters: Mapping[str, Array]) -> str:
-        """The element whose residual or tangent at x is not finite, for messages; empty if none."""
+        """Return the element whose residual or tangent is not finite, in words.
+
+        Parameters
+        ----------
+        x : array (size,)
+            Unknowns.
+        parameters : mapping of str to array (k,)
+            Block -> parameters.
+
+        Returns
+        -------
+        str
+            Empty if there is none.
+        """
         for block in self.blocks:
             if block.name in parameters:
                 found = not_finite(block, *block.tangent(x, parameters[block.name]))
@@ -188,7 +329,22 @@ class Assembler:
     def linearise(
         self, x: Array, parameters: Mapping[str, Array]
     ) -> tuple[Array, csc_array[np.float64]]:
-        """Residual (size,) and tangent (size, size), csc with the fixed pattern."""
+        """Return residual and tangent.
+
+        Parameters
+        ----------
+        x : array (size,)
+            Unknowns.
+        parameters : mapping of str to array (k,)
+            Block -> parameters.
+
+        Returns
+        -------
+        residual : array (size,)
+            Residual.
+        tangent : sparse array (size, size)
+            In CSC form, with the same pattern always.
+        """
         total, data = np.zeros(self.size), np.zeros(self.pattern.nnz)
         for block, scatter in zip(self.blocks, self.pattern.scatter, strict=True):
             if block.name not in parameters:
@@ -206,7 +362,18 @@ class Assembler:
         return total, self.pattern.matrix(data)
 
     def cross(self, fixed: Integers) -> Integers:
-        """Positions in the data of the rows and columns of these unknowns; kept for later calls."""
+        """Return the positions of rows and columns of unknowns in the data of the tangent.
+
+        Parameters
+        ----------
+        fixed : array of int
+            Numbers of the unknowns.
+
+        Returns
+        -------
+        array of int
+            Positions.
+        """
         key = fixed.tobytes()
         places = self.memo.crosses.get(key)
         if places is None:

@@ -28,9 +28,14 @@ AXES = ("x", "y", "z", "r")
 
 @dataclass(frozen=True)
 class DofLayout:
-    """Places of the named fields in the vector of unknowns.
+    """Numbering of named fields in the vector of unknowns.
 
-    names, counts: fields in the order in which they are numbered.
+    Parameters
+    ----------
+    names : tuple of str
+        Fields in the order of their unknowns.
+    counts : tuple of int
+        Number of unknowns of each.
     """
 
     names: tuple[str, ...]
@@ -38,21 +43,64 @@ class DofLayout:
 
     @classmethod
     def of(cls, **counts: int) -> DofLayout:
-        """Layout of fields given as name=count, in that order."""
+        """Make a layout.
+
+        Parameters
+        ----------
+        **counts : int
+            Field -> number of unknowns, in this order.
+
+        Returns
+        -------
+        DofLayout
+            The layout.
+        """
         return cls(tuple(counts), tuple(counts.values()))
 
     @property
     def total(self) -> int:
-        """Length of the vector of unknowns."""
+        """Number of all unknowns."""
         return sum(self.counts)
 
     def count(self, name: str) -> int:
-        """Number of unknowns of a field; KeyError for an unknown name."""
+        """Return the number of unknowns of a field.
+
+        Parameters
+        ----------
+        name : str
+            The field.
+
+        Returns
+        -------
+        int
+            Number.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such field; a KeyError.
+        """
         part = self.part(name)
         return int(part.stop - part.start)
 
     def part(self, name: str) -> slice:
-        """Slice of a field in the vector of unknowns; KeyError for an unknown name."""
+        """Return the slice of a field in the vector of unknowns.
+
+        Parameters
+        ----------
+        name : str
+            The field.
+
+        Returns
+        -------
+        slice
+            First and last number.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such field; a KeyError.
+        """
         try:
             return self._parts[name]
         except KeyError:
@@ -60,7 +108,23 @@ class DofLayout:
             raise UnknownNameError(f"no field {name!r}; there are {known}") from None
 
     def dofs(self, name: str) -> Integers:
-        """Numbers (count,) of the unknowns of a field; KeyError for an unknown name."""
+        """Return the numbers of the unknowns of a field.
+
+        Parameters
+        ----------
+        name : str
+            The field.
+
+        Returns
+        -------
+        array of int (count,)
+            Numbers.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such field; a KeyError.
+        """
         part = self.part(name)
         return np.arange(part.start, part.stop)
 

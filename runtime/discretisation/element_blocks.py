@@ -82,16 +82,30 @@ class ElementKernel(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ElementBlock:
-    """Like elements of one kernel.
+    """Elements of one kernel.
 
-    name: by which parameters are given. coordinates: (n, 2 nodes) reference (z, r), node by node.
-    dofs: (n, ndof) numbers of the unknowns. data: (n, k) constants of each element or None.
-    rule: quadrature rule, None for the kernel's own. constant: the tangent depends on parameters
-    alone, so that it is evaluated once for each set of them. point_data: (n, points, k) values at
-    the quadrature points, such as the history of the steps before, or None.
-    check_orientation: elements that are inside out are refused; False for a page whose nodes have
-    another order than VTK's. calls: the latest call of each task and the parameters it was made
-    with; it saves time only.
+    Parameters
+    ----------
+    name : str
+        Name, by which parameters are given.
+    kernel : Kernel
+        The kernel.
+    coordinates : array (n, nodes dim)
+        Reference coordinates, node by node.
+    dofs : array of int (n, ndof)
+        Numbers of the unknowns.
+    data : array (n, k), optional
+        Data of each element.
+    rule : Rule, optional
+        Quadrature rule; the kernel's own if left out.
+    constant : bool
+        True if the tangent depends on parameters alone: it is evaluated once for each set.
+    point_data : array (n, points, k), optional
+        Values at the quadrature points, such as history.
+    check_orientation : bool
+        Refuse inverted elements. False for a page with another order of nodes than VTK's.
+    calls : dict
+        The latest call of each task; saves time only.
     """
 
     name: str
@@ -116,7 +130,20 @@ class ElementBlock:
         return {**vars(self), "calls": {}}
 
     def residual(self, x: Array, parameters: Array) -> Array:
-        """Element residuals (n, ndof) at the global vector x."""
+        """Return the element residuals.
+
+        Parameters
+        ----------
+        x : array (size,)
+            All unknowns.
+        parameters : array (k,)
+            Parameters of the kernel.
+
+        Returns
+        -------
+        array (n, ndof)
+            Residuals.
+        """
         again, dofs = self._again("residual", parameters), self._gathered(x)
         if again is None:
             return self.kernel.residual(self.coordinates, dofs, **self.given(parameters))
@@ -124,7 +151,22 @@ class ElementBlock:
         return values
 
     def tangent(self, x: Array, parameters: Array) -> tuple[Array, Array]:
-        """Element residuals (n, ndof) and tangents (n, ndof, ndof) at the global vector x."""
+        """Return element residuals and tangents.
+
+        Parameters
+        ----------
+        x : array (size,)
+            All unknowns.
+        parameters : array (k,)
+            Parameters of the kernel.
+
+        Returns
+        -------
+        residual : array (n, ndof)
+            Residuals.
+        tangent : array (n, ndof, ndof)
+            Tangents.
+        """
         again, dofs = self._again("tangent", parameters), self._gathered(x)
         if again is None:
             return self.kernel.tangent(self.coordinates, dofs, **self.given(parameters))
@@ -148,7 +190,20 @@ class ElementBlock:
         return known[1]
 
     def pieces(self, scatter: Integers) -> Iterator[tuple[ElementBlock, Integers]]:
-        """Parts of the block whose tangents fit into a core's cache, with theirs of `scatter`."""
+        """Yield parts of the block whose tangents fit into the cache of a core.
+
+        Parameters
+        ----------
+        scatter : array of int
+            Positions of the block's entries in the tangent.
+
+        Yields
+        ------
+        block : ElementBlock
+            Part of the elements.
+        scatter : array of int
+            Their positions.
+        """
         n = len(self.dofs)
         step = max(_PIECE // max(self.dofs.shape[1] ** 2, 1), _GROUP)
         if n <= step:
@@ -166,7 +221,18 @@ class ElementBlock:
             yield piece, scatter[width * first : width * (first + step)]
 
     def since(self, x: Array) -> ElementBlock:
-        """The block in the step after x: data u_old1, ... of unknowns u1, ... are those of x."""
+        """Return the block in the next step: data u_old1, ... have the values of u1, ...
+
+        Parameters
+        ----------
+        x : array (size,)
+            Unknowns at the end of the previous step.
+
+        Returns
+        -------
+        ElementBlock
+            The block with these data.
+        """
         unknowns, names = (tuple(getattr(self.kernel, n, ())) for n in ("unknowns", "data"))
         places = {f"{u[:-1]}_old{u[-1]}": k for k, u in enumerate(unknowns)}
         columns = [k for k, name in enumerate(names) if name in places]
@@ -177,13 +243,35 @@ class ElementBlock:
         return replace(self, data=data)
 
     def given(self, parameters: Array) -> dict[str, Any]:
-        """Arguments of its kernel besides coordinates and unknowns."""
+        """Return the arguments of the kernel besides coordinates and unknowns.
+
+        Parameters
+        ----------
+        parameters : array (k,)
+            Parameters of the kernel.
+
+        Returns
+        -------
+        dict
+            Keyword arguments.
+        """
         given = {"data": self.data, "parameters": parameters, "rule": self.rule}
         return given if self.point_data is None else {**given, "point_data": self.point_data}
 
     def fields(self, x: Array, parameters: Array) -> dict[str, Array]:
-        """Fields of the kernel at its quadrature points, name -> (n, points); with them its
-        internal unknowns, the same at all points of an element.
+        """Return the fields at the quadrature points, and internal unknowns of the elements.
+
+        Parameters
+        ----------
+        x : array (size,)
+            All unknowns.
+        parameters : array (k,)
+            Parameters of the kernel.
+
+        Returns
+        -------
+        dict of str to array (n, points)
+            Name -> values.
         """
         internal = self.internal
         if not self.kernel.fields:
@@ -198,7 +286,7 @@ class ElementBlock:
 
     @property
     def internal(self) -> dict[str, Integers]:
-        """Numbers (n,) of the unknowns that each element has for itself, by name."""
+        """Numbers (n,) of the internal unknowns of the elements, by name."""
         names = getattr(self.kernel, "internal", ())
         unknowns = getattr(self.kernel, "unknowns", ())
         return {name: self.dofs[:, unknowns.index(name)] for name in names}

@@ -34,19 +34,31 @@ from softehl.runtime.suggestions import few, listed
 class Problem:
     """Assembled equations with prescribed unknowns.
 
-    parameters: block name -> parameters, (k,) in the order of the kernel or a mapping by name (put
-    in order here); a block that is not named is switched off.
-    scales: field -> reference size of its residuals, one or one for each: a force (N), a flux
-    (mm^2/s), a gap times area (mm^3). They may be left out: residuals are measured by the terms of
-    their equations (`residual_norm`), with which a scale that is given must agree: the stricter of
-    both counts.
-    fixed, values: unknowns that are prescribed, and to what (same length). Their equations are
-    x = value, and they are eliminated from the others.
-    absolute: residuals are measured by `scales` alone, of which every field needs one, however
-    small the loads are: for families of problems that are solved to one accuracy.
+    Parameters
+    ----------
+    assembler : Assembler
+        The elements.
+    layout : DofLayout
+        Fields of the unknowns.
+    parameters : mapping of str to array or mapping
+        Block -> parameters, in the order of the kernel or by name; blocks without parameters are
+        switched off.
+    scales : mapping of str to float or array
+        Field -> reference size of its residuals: a force [N], a flux [mm^2/s]. Left out, a
+        residual is measured by the terms of its equation; else the stricter of both counts.
+    fixed : array of int (k,)
+        Prescribed unknowns. Their equations are x = value, and they are eliminated from others.
+    values : array (k,)
+        Their values.
+    guards : tuple of Guard
+        Bounds of a step.
+    absolute : bool
+        True: residuals are measured by `scales` alone, of which every field needs one.
 
-    Raises ProblemError for unknown names, parameters that are missing or not finite, and for an
-    unknown that is prescribed to two values.
+    Raises
+    ------
+    ProblemError
+        A name is unknown, a parameter is missing or not finite, or an unknown has two values.
     """
 
     assembler: Assembler
@@ -101,7 +113,18 @@ class Problem:
             )
 
     def name_of(self, number: int) -> str:
-        """An unknown for messages: its number, field, element and place."""
+        """Return an unknown in words: its number, field, element and place.
+
+        Parameters
+        ----------
+        number : int
+            Its number.
+
+        Returns
+        -------
+        str
+            For messages.
+        """
         layout = self.layout
         field_name = next(n for n in layout.names if number < layout.part(n).stop)
         active = [block for block in self.assembler.blocks if block.name in self.parameters]
@@ -109,35 +132,110 @@ class Problem:
         return f"unknown {number} of field {field_name!r}{place}"
 
     def where_not_finite(self, x: Array) -> str:
-        """The element whose residual or tangent is not finite at x, (n,); empty if none is."""
+        """Return the element whose residual or tangent is not finite, in words.
+
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns.
+
+        Returns
+        -------
+        str
+            Empty if there is none.
+        """
         return self.assembler.not_finite(x, self.parameters)
 
     def at(self, x: Array) -> Problem:
-        """The problem with the elements that it has at x, (n,): its own, unless they are sought."""
+        """Return the problem with the elements that it has at x, such as pairs in contact.
+
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns.
+
+        Returns
+        -------
+        Problem
+            The problem itself, unless elements depend on x.
+        """
         return self
 
     def residual(self, x: Array) -> Array:
-        """R(x), (n,): internal minus external virtual work; x - value for prescribed unknowns."""
+        """Return R(x): internal less external virtual work; x - value of prescribed unknowns.
+
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns.
+
+        Returns
+        -------
+        array (n,)
+            Residual.
+        """
         r = self.assembler.residual(x, self.parameters)
         r[self.fixed] = x[self.fixed] - self.values
         return r
 
     def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
-        """R(x), (n,), and K = dR/dx, (n, n), with prescribed unknowns eliminated.
+        """Return R(x) and K = dR/dx, with prescribed unknowns eliminated.
 
-        If x does not yet have the prescribed values, their influence on the other equations
-        is moved into R, so that -K^-1 R is the exact Newton step of the whole system.
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns. If they do not have the prescribed values, their influence on the other
+            equations is in R, so that -K^-1 R is the exact Newton step.
+
+        Returns
+        -------
+        residual : array (n,)
+            Residual.
+        tangent : sparse array (n, n)
+            In CSC form.
         """
         return self.linearise_with(x, None)
 
     def linearise_with(
         self, x: Array, addition: Array | None
     ) -> tuple[Array, csc_array[np.float64]]:
-        """As `linearise`, with `addition` (nnz,) to the entries of K before the elimination."""
+        """Return R(x) and K as `linearise`, with an addition to K.
+
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns.
+        addition : array (nnz,) or None
+            Added to the entries of K before the elimination.
+
+        Returns
+        -------
+        residual : array (n,)
+            Residual.
+        tangent : sparse array (n, n)
+            In CSC form.
+        """
         return self._linearised(x, addition, None)[:2]
 
     def linearise_along(self, x: Array, rate: Array) -> tuple[Array, csc_array[np.float64], Array]:
-        """As `linearise`, and K times the rate (n,) before the elimination, zero where fixed."""
+        """Return R(x) and K as `linearise`, and K times a vector before the elimination.
+
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns.
+        rate : array (n,)
+            The vector.
+
+        Returns
+        -------
+        residual : array (n,)
+            Residual.
+        tangent : sparse array (n, n)
+            In CSC form.
+        product : array (n,)
+            Zero for prescribed unknowns.
+        """
         return self._linearised(x, None, rate)
 
     def _linearised(
@@ -157,11 +255,33 @@ class Problem:
         return r, self.eliminated(K), along
 
     def norm(self, r: Array) -> float:
-        """Root of the sum over fields of |R / scale|^2, 2-norms; every field needs a scale."""
+        """Return the root of the sum over fields of |R / scale|^2.
+
+        Parameters
+        ----------
+        r : array (n,)
+            Residual; every field needs a scale.
+
+        Returns
+        -------
+        float
+            Norm.
+        """
         return float(np.linalg.norm(self.scaled(r)))
 
     def scaled(self, r: Array) -> Array:
-        """Residual (n,) over the reference size of its field; `norm` is the 2-norm of it."""
+        """Return a residual divided by the reference sizes of its fields.
+
+        Parameters
+        ----------
+        r : array (n,)
+            Residual.
+
+        Returns
+        -------
+        array (n,)
+            `norm` is its 2-norm.
+        """
         return r * self._weights
 
     @cached_property
@@ -175,11 +295,28 @@ class Problem:
         return weights
 
     def measure(self, x: Array, K: csc_array[np.float64] | None, *, rounded: bool = False) -> float:
-        """Dimensionless size of the residual at x, (n,), inf where it is not finite.
+        """Return the dimensionless size of the residual.
 
-        `residual_norm` says how; prescribed unknowns count relative to their values. K: a tangent
-        near x. rounded: what rounding may have caused does not count. With `absolute` scales it is
-        the norm. Raises ProblemError if an unknown occurs in no block that is switched on.
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns.
+        K : sparse array (n, n) or None
+            A tangent near x.
+        rounded : bool
+            Leave out what rounding may cause.
+
+        Returns
+        -------
+        float
+            inf if the residual is not finite. Every equation counts relative to its own terms,
+            every field to its loads, reactions and internal forces; with `absolute` scales it is
+            the norm.
+
+        Raises
+        ------
+        ProblemError
+            An unknown occurs in no block that is switched on.
         """
         self._require_determined()
         if self.absolute:
@@ -207,7 +344,18 @@ class Problem:
         return max(found, self._by_scales(defect))
 
     def merit(self, x: Array) -> float:
-        """Norm of the residuals at x, (n,), each field relative to its forces there."""
+        """Return the norm of the residuals, each field relative to its forces.
+
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns.
+
+        Returns
+        -------
+        float
+            Norm.
+        """
         if self.absolute:
             return self.norm(self.residual(x))
         r, forces = self.assembler.residual_and_size(x, self.parameters)
@@ -216,7 +364,20 @@ class Problem:
         return float(np.linalg.norm([a / (b or 1.0) for a, b in sizes]))
 
     def noise(self, x: Array, K: csc_array[np.float64]) -> Array:
-        """Share of rounding in each residual at x, (n,), at most. K: a tangent near x."""
+        """Return an upper bound of rounding in each residual.
+
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns.
+        K : sparse array (n, n)
+            A tangent near x.
+
+        Returns
+        -------
+        array (n,)
+            Bounds.
+        """
         return ROUNDING * self._terms(np.abs(x) + self.assembler.reach(), K)
 
     def _terms(self, magnitudes: Array, K: csc_array[np.float64]) -> Array:
@@ -237,8 +398,21 @@ class Problem:
         return max((float(np.linalg.norm(part)) for part in found), default=0.0)
 
     def beyond_rounding(self, r: Array, x: Array, K: csc_array[np.float64]) -> float:
-        """Norm of what is left of the residual r at x, (n,), once what the last digits of x make of
-        it does not count; inf without `absolute` scales. K: a tangent near x.
+        """Return the norm of a residual less what the last digits of x may cause.
+
+        Parameters
+        ----------
+        r : array (n,)
+            Residual at x.
+        x : array (n,)
+            Unknowns.
+        K : sparse array (n, n)
+            A tangent near x.
+
+        Returns
+        -------
+        float
+            inf without `absolute` scales.
         """
         if not self.absolute:
             return np.inf
@@ -265,13 +439,40 @@ class Problem:
             )
 
     def step_limit(self, x: Array, dx: Array) -> float:
-        """Largest fraction of the step that every guard admits."""
+        """Return the largest fraction of a step that every guard admits.
+
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns.
+        dx : array (n,)
+            Step.
+
+        Returns
+        -------
+        float
+            1 without guards.
+        """
         return min((guard.limit(x, dx) for guard in self.guards), default=1.0)
 
     def with_parameters(self, **changes: Mapping[str, float] | None) -> Problem:
-        """The problem with other parameters: block={name: value, ...}, or block=None to switch off.
+        """Return the problem with other parameters.
 
-        Parameters that are not named keep their value; a block that was off needs all of them.
+        Parameters
+        ----------
+        **changes : mapping of str to float, or None
+            Block -> parameters that change; None switches the block off. A block that was off needs
+            all of its parameters.
+
+        Returns
+        -------
+        Problem
+            The problem.
+
+        Raises
+        ------
+        ProblemError
+            A name is unknown, or a parameter missing.
         """
         parameters = dict(self.parameters)
         for name, values in changes.items():
@@ -282,7 +483,20 @@ class Problem:
         return replace(self, parameters=parameters)
 
     def with_fixed(self, fixed: Sequence[Integers], values: Sequence[Array | float]) -> Problem:
-        """The problem with these unknowns prescribed, and no others; parts are joined."""
+        """Return the problem with these unknowns prescribed, and no others.
+
+        Parameters
+        ----------
+        fixed : sequence of array of int
+            Numbers of unknowns, in parts.
+        values : sequence of array or float
+            Values of each part.
+
+        Returns
+        -------
+        Problem
+            The problem.
+        """
         full = [
             np.broadcast_to(np.asarray(v, dtype=np.float64), f.shape)
             for f, v in zip(fixed, values, strict=True)
@@ -294,22 +508,70 @@ class Problem:
         )
 
     def also_fixed(self, fixed: Integers, value: Array | float) -> Problem:
-        """The problem with these unknowns prescribed too."""
+        """Return the problem with further unknowns prescribed.
+
+        Parameters
+        ----------
+        fixed : array of int (k,)
+            Numbers of unknowns.
+        value : array (k,) or float
+            Their values.
+
+        Returns
+        -------
+        Problem
+            The problem.
+        """
         return self.with_fixed([self.fixed, fixed], [self.values, value])
 
     def admissible(self, x: Array) -> Array:
-        """x with the prescribed values."""
+        """Return unknowns with the prescribed values.
+
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns.
+
+        Returns
+        -------
+        array (n,)
+            A copy.
+        """
         y = x.copy()
         y[self.fixed] = self.values
         return y
 
     def since(self, x: Array) -> Problem:
-        """The problem of the step after x, for kernels that ask for unknowns of the step before."""
+        """Return the problem of the next step; see `ElementBlock.since`.
+
+        Parameters
+        ----------
+        x : array (n,)
+            Unknowns at the end of the previous step.
+
+        Returns
+        -------
+        Problem
+            The problem.
+        """
         assembler = self.assembler.since(x)
         return self if assembler is self.assembler else replace(self, assembler=assembler)
 
     def fields(self, name: str, x: Array) -> dict[str, Array]:
-        """Fields of a block that is switched on, at its points: name -> (n, points)."""
+        """Return the fields of a block at its quadrature points.
+
+        Parameters
+        ----------
+        name : str
+            A block that is switched on.
+        x : array (n,)
+            Unknowns.
+
+        Returns
+        -------
+        dict of str to array (elements, points)
+            Name -> values.
+        """
         return self.assembler.block(name).fields(x, self.parameters[name])
 
     def _changed(self, name: str, values: Mapping[str, float]) -> Array:
@@ -324,7 +586,18 @@ class Problem:
         return in_order(block, {**dict(zip(names, old, strict=True)), **values})
 
     def eliminated(self, K: csc_array[np.float64]) -> csc_array[np.float64]:
-        """K with the rows and columns of prescribed unknowns replaced by those of the identity."""
+        """Return K with rows and columns of prescribed unknowns replaced by those of the identity.
+
+        Parameters
+        ----------
+        K : sparse array (n, n)
+            Tangent, which is changed.
+
+        Returns
+        -------
+        sparse array (n, n)
+            K.
+        """
         if not len(self.fixed):
             return K
         K.data[self.assembler.cross(self.fixed)] = 0.0

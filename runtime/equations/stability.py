@@ -23,8 +23,8 @@ from softehl.runtime.solve.eigen import Pivots
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 
 
-class Unstable(RuntimeWarning):
-    """A state was found that solves the equations and is not stable."""
+class UnstableState(RuntimeWarning):
+    """A state solves the equations and is unstable."""
 
 
 def negative_directions(problem: Any, x: Array) -> int | None:
@@ -91,7 +91,7 @@ def warn_unstable(problem: Any, x: Array, factors: tuple[Any, Any] | None, words
         warn(
             f"the state at {words} is unstable: its energy falls along {along} "
             '(result.modes shows them); study.follow(detect="bifurcation") finds other branches',
-            Unstable,
+            UnstableState,
             stacklevel=4,
         )
 

@@ -54,13 +54,34 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Numbering and assembler, which all steps share.
+    """Discrete equations of a study: mesh, numbering of the unknowns, elements.
 
-    conditions: prescribed values, as they were written down. implied: ties both sides of which
-    are prescribed: checked, not solved. start: name -> (points,) initial values, nan where nothing
-    was said. share: how the unknowns are spread over processes; whole: where they are, the system
-    of all of them. statement: what was written down, and written: how much of it there was.
-    contacts: whose elements are sought at each iterate.
+    Attributes
+    ----------
+    mesh : Mesh
+        The mesh.
+    numbering : object
+        Numbers of the unknowns: `nodal` by name (points,), `layout` of all fields.
+    assembler : Assembler
+        The elements.
+    blocks : mapping of str to object
+        Blocks of pages by name.
+    conditions : tuple
+        Prescribed values.
+    implied : tuple
+        Ties both sides of which are prescribed: checked, not solved.
+    start : mapping of str to array (points,)
+        Initial values, nan where there are none.
+    share : object
+        Distribution of the unknowns over processes.
+    whole : System, optional
+        The equations of all processes, of a distributed system.
+    statement : object
+        Definition of the study.
+    written : int
+        Size of the definition when the equations were made.
+    contacts : tuple
+        Contacts, whose elements are found at each iterate.
     """
 
     mesh: Mesh
@@ -92,7 +113,13 @@ class System:
         return self.numbering.layout.total
 
     def at_rest(self) -> Array:
-        """Unknowns at the start, (n,): zero but for initial values."""
+        """Return the initial values of the unknowns.
+
+        Returns
+        -------
+        array (n,)
+            Zero where none are given.
+        """
         x = np.zeros(self.size)
         for name, values in self.start.items():
             numbers = self.numbering.nodal[name]
@@ -101,11 +128,37 @@ class System:
         return x
 
     def histories(self) -> dict[str, Array]:
-        """Point data at the start."""
+        """Return the initial values of history.
+
+        Returns
+        -------
+        dict of str to array (cells, points, k)
+            Block -> values.
+        """
         return {b.name: b.initial for b in self.blocks.values() if b.initial is not None}
 
     def still(self, t: float, old: Array, histories: Mapping[str, Array]) -> Step:
-        """A step without time: t is the load factor, rates are zero.  Raises StudyError."""
+        """Return a quasi-static step.
+
+        Parameters
+        ----------
+        t : float
+            Load factor.
+        old : array (n,)
+            Unknowns of the previous step.
+        histories : mapping of str to array
+            History of the previous step.
+
+        Returns
+        -------
+        Step
+            With rates of zero.
+
+        Raises
+        ------
+        StudyError
+            A page needs the length of a time step.
+        """
         for block in self.blocks.values():
             if "dt" in block.kernel.parameters and "dt" not in block.parameters:
                 raise StudyError(
@@ -115,7 +168,13 @@ class System:
         return Step(t, t, old, 0.0, np.zeros(self.size), 0.0, histories)
 
     def resting(self) -> Problem:
-        """The equations without time at load factor 0, at the values of the start."""
+        """Return the problem at load factor 0, at the initial values.
+
+        Returns
+        -------
+        Problem
+            The problem.
+        """
         return self.problem(self.still(0.0, self.at_rest(), self.histories()))
 
     def committed(

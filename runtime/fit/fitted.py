@@ -13,7 +13,7 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.argument_checks import finite
 from softehl.runtime.definition.problem_definition import Statement, StudyError
-from softehl.runtime.equations.stability import Unstable
+from softehl.runtime.equations.stability import UnstableState
 from softehl.runtime.fit.jax_operation import Operation
 from softehl.runtime.fit.least_squares import Fit, LeastSquares
 from softehl.runtime.fit.measurements import Data, Measured
@@ -225,7 +225,7 @@ class _Runner:
         other, found = _changed(self.study, changes), list[Result]()
         given = {"progress": False, "record": True, **self.path}
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Unstable)  # of values on the way
+            warnings.simplefilter("ignore", UnstableState)  # of values on the way
             if "dt" in self.path:
                 return list(other.march(**given))
             other.solve(on_step=found.append, **given)

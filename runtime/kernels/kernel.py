@@ -42,10 +42,11 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Kernel(Family):
-    """One kernel family, compiled; see `Family` for the arrays.
+    """Compiled kernel of one kind of element; arrays hold n elements.
 
-    Calls also take, by name, what the family needs: data, point_data, parameters, rule.
-    A kernel is pickled by its key, the folder of its library: another process loads that.
+    Calls take by name what the kernel needs besides coordinates and unknowns: `data` (n, k),
+    `point_data` (n, points, k), `parameters` (k,) and `rule`. A kernel is pickled by its name and
+    the folder of its library.
     """
 
     def __repr__(self) -> str:
@@ -60,53 +61,239 @@ class Kernel(Family):
         return _reloaded, (self.name, _place(self.library), self.signature)
 
     def call(self, task: str, coordinates: Array, dofs: Array, **given: Any) -> Call:
-        """A checked call of a task, which may be made again with other unknowns."""
+        """Return a checked call of a task, which can be repeated with other unknowns.
+
+        Parameters
+        ----------
+        task : str
+            One of `tasks`.
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        **given : array
+            Data and parameters; see the class.
+
+        Returns
+        -------
+        Call
+            The call.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such task.
+        """
         return Call(self, task, coordinates, dofs, Given(**given))
 
     def energy(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
-        """Potential of each element, (n,)."""
+        """Return the potential of each element.
+
+        Parameters
+        ----------
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        **given : array
+            Data and parameters; see the class.
+
+        Returns
+        -------
+        array (n,)
+            Potentials.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such task.
+        """
         call = Call(self, "energy", coordinates, dofs, Given(**given))
         return call.run(np.empty(call.n))
 
     def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
-        """Internal minus external virtual work, (n, ndof)."""
+        """Return the residuals: internal less external virtual work.
+
+        Parameters
+        ----------
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        **given : array
+            Data and parameters; see the class.
+
+        Returns
+        -------
+        array (n, ndof)
+            Residuals.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such task.
+        """
         call = Call(self, "residual", coordinates, dofs, Given(**given))
         return call.run(np.empty((call.n, call.ndof)))
 
     def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
-        """Residual (n, ndof) and tangent dR_i/du_j (n, ndof, ndof)."""
+        """Return residuals and tangents.
+
+        Parameters
+        ----------
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        **given : array
+            Data and parameters; see the class.
+
+        Returns
+        -------
+        residual : array (n, ndof)
+            Residuals.
+        tangent : array (n, ndof, ndof)
+            dR_i/du_j.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such task.
+        """
         call = Call(self, "tangent", coordinates, dofs, Given(**given))
         tangent = np.empty((call.n, call.ndof, call.ndof))
         return call.run(np.empty((call.n, call.ndof)), tangent), tangent
 
     def product(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
-        """Tangent times `direction` (n, ndof), without forming the tangent: (n, ndof)."""
+        """Return the tangents times a vector, without the tangents.
+
+        Parameters
+        ----------
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        direction : array (n, ndof)
+            The vector.
+        **given : array
+            Data and parameters; see the class.
+
+        Returns
+        -------
+        array (n, ndof)
+            Products.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such task.
+        """
         call = Call(self, "product", coordinates, dofs, Given(direction=direction, **given))
         return call.run(np.empty((call.n, call.ndof)))
 
     def derivative(self, name: str, coordinates: Array, dofs: Array, **given: Any) -> Array:
-        """Derivative of the residual by the parameter, datum or coordinate `name`: (n, ndof)."""
+        """Return the derivative of the residuals by an argument.
+
+        Parameters
+        ----------
+        name : str
+            Parameter, datum or coordinate of `Model.offer(derivatives=...)`.
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        **given : array
+            Data and parameters; see the class.
+
+        Returns
+        -------
+        array (n, ndof)
+            Derivatives.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such derivative.
+        """
         call = Call(self, f"d_{name}", coordinates, dofs, Given(**given))
         return call.run(np.empty((call.n, call.ndof)))
 
     def pseudo_load(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
-        """Derivative of the residual along a variation of the elements, unknowns held: (n, ndof).
+        """Return the derivative of the residuals along a variation of the elements.
 
-        direction: (n, coordinates + data + parameters), how each of these moves, in this order.
+        Parameters
+        ----------
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements, which are held.
+        direction : array (n, coordinates + data + parameters)
+            Variation of each of these, in this order.
+        **given : array
+            Data and parameters; see the class.
+
+        Returns
+        -------
+        array (n, ndof)
+            Derivatives.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such task.
         """
         call = Call(self, "pseudo_load", coordinates, dofs, Given(direction=direction, **given))
         return call.run(np.empty((call.n, call.ndof)))
 
     def fields_rate(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
-        """Derivative of `fields_at` along a variation: (n, points, len(fields)).
+        """Return the derivative of `fields_at` along a variation.
 
-        direction: (n, coordinates + data + parameters + ndof), how each of these moves.
+        Parameters
+        ----------
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        direction : array (n, coordinates + data + parameters + ndof)
+            Variation of each of these, in this order.
+        **given : array
+            Data and parameters; see the class.
+
+        Returns
+        -------
+        array (n, points, fields)
+            Derivatives.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such task.
         """
         call = Call(self, "fields_rate", coordinates, dofs, Given(direction=direction, **given))
         return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
 
     def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
-        """Post-processing values at the quadrature points, (n, points, len(fields))."""
+        """Return the fields at the quadrature points.
+
+        Parameters
+        ----------
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        **given : array
+            Data and parameters; see the class.
+
+        Returns
+        -------
+        array (n, points, fields)
+            Values.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such task.
+        """
         call = Call(self, "fields", coordinates, dofs, Given(**given))
         return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
 

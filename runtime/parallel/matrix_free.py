@@ -43,10 +43,23 @@ end at Newton's tolerance: K/mu = 1000 396, 321, 253, 264; nu = 0.3 26, 22, 18, 
 
 @dataclass(eq=False)
 class MatrixFree:
-    """Settings of the engine.
+    """Engine that assembles no matrix: conjugate gradients with p-multigrid.
 
-    tolerance: of the linear solutions, relative to the residual. most: iterations of one. threads:
-    of products; None: $OMP_NUM_THREADS, or all processors. iterations: of every solution so far.
+    Parameters
+    ----------
+    tolerance : float
+        Tolerance of the linear solutions, relative to the residual.
+    most : int
+        Largest number of iterations of one solution.
+    threads : int, optional
+        Threads of the products; $OMP_NUM_THREADS, or all processors, if left out.
+    iterations : list of int
+        Iterations of every solution so far.
+
+    Raises
+    ------
+    StudyError
+        A setting is not allowed.
     """
 
     tolerance: float = TOLERANCE

@@ -27,11 +27,22 @@ _AXES = ("x", "y", "z")
 
 @dataclass(eq=False)
 class Petsc:
-    """PETSc on all processes.
+    """Engine that assembles and solves on all processes of mpirun by PETSc.
 
-    options: by PETSc's own names, {"ksp_type": "cg", "pc_type": "gamg"}; those of the command line
-    and of PETSC_OPTIONS count too. matrix_free: whether the tangent is a shell matrix, with
-    multigrid in the order. times: what it has cost so far. Raises MissingPetsc.
+    Parameters
+    ----------
+    options : mapping of str to object
+        PETSc's options, {"ksp_type": "cg", "pc_type": "gamg"}; those of the command line and of
+        PETSC_OPTIONS apply, too.
+    matrix_free : bool
+        True: the tangent is a shell matrix, with p-multigrid.
+    times : Times
+        Time that it took so far.
+
+    Raises
+    ------
+    MissingPetsc
+        PETSc is not installed.
     """
 
     options: Mapping[str, Any] = field(default_factory=dict)

@@ -443,7 +443,7 @@ class Result:
         """
         x = self.point.solution.x
         squares, found = natural(self.system, self.problem, x, count, mass)
-        return Modes(read_only(squares), tuple(Shape.of(self, mode) for mode in found))
+        return Modes(read_only(squares), tuple(ModeShape.of(self, mode) for mode in found))
 
     def sensitivity(
         self,
@@ -597,11 +597,11 @@ class Result:
         return found
 
 
-class Shape(Result):
+class ModeShape(Result):
     """Mode about a state: a Result whose unknowns are the mode; it has no fields."""
 
     @classmethod
-    def of(cls, state: Result, mode: Array) -> Shape:
+    def of(cls, state: Result, mode: Array) -> ModeShape:
         """A mode (n,) about a state."""
         solution = Solution(mode, Status.CONVERGED, "", (), 0, 0)
         return cls(state.system, state.problem, replace(state.point, solution=solution))
@@ -622,12 +622,12 @@ class Modes:
     ----------
     squares : array (k,)
         Squares of the angular frequencies [1/s^2]; negative in unstable directions.
-    shapes : tuple of Shape
+    shapes : tuple of ModeShape
         A Result for each, whose unknowns are the mode, of unit modal mass.
     """
 
     squares: Array
-    shapes: tuple[Shape, ...]
+    shapes: tuple[ModeShape, ...]
 
     def __repr__(self) -> str:
         """Summary in one line."""

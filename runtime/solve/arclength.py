@@ -236,21 +236,36 @@ class _Corrector:
 
 @dataclass(frozen=True)
 class Arclength:
-    """Pseudo-arclength continuation, which passes limit points and reports them.
+    """Pseudo-arclength continuation: it passes limit points and locates them.
 
-    newton: corrector on the plane normal to the tangent; steps: step rule, lengths in the metric
-    |dy|^2 = |dx|^2 / (n x_scale^2) + (dparameter / parameter_scale)^2;
-    x_scale: one for all, or one for each (n,): inf for unknowns that do not count in lengths;
-    turn: largest angle between successive tangents [degrees], the half of it between the chord of a
-    step and the tangent at either end, as on a circle. These angles are of the diagram of |x| over
-    the parameter that is drawn to the size of the path so far, so that they do not depend on units
-    or on the first step. A step with a sharper angle, or after which the number of negative pivots
-    is odd where it was even without a fold, has jumped to another part of the path or passed two
-    folds: it is cut. Steps below 1e-3 of the diagram pass: there is a kink, or a bifurcation;
-    difference: relative step of the central difference for dR/dparameter, about eps^(1/3);
-    fold_tolerance: parameter component of the unit tangent at which a fold counts as located
-    (the error of its parameter is of second order in this);
-    max_points, keep_all, name: as for Continuation.
+    Parameters
+    ----------
+    newton : Newton
+        Corrector on the plane normal to the tangent.
+    steps : StepRule
+        Step control, lengths in the metric
+        |dy|^2 = |dx|^2 / (n x_scale^2) + (dparameter / parameter_scale)^2.
+    x_scale : float or array (n,)
+        Unit of the unknowns; inf for unknowns without length.
+    parameter_scale : float
+        Unit of the parameter.
+    turn : float
+        Largest angle between successive tangents, and twice that between the chord of a step and
+        the tangent at either end [degrees], in the diagram of |x| over the parameter scaled to
+        the path so far. A step with a sharper angle, or after which the number of negative pivots
+        changes between odd and even without a limit point, is cut, down to 1e-3 of the diagram,
+        where there is a kink or a bifurcation.
+    difference : float
+        Relative step of the central difference for dR/dparameter, about eps^(1/3).
+    fold_tolerance : float
+        Parameter component of the unit tangent at which a limit point is located; the error of
+        its parameter is of second order in it.
+    max_points : int
+        Largest number of points.
+    keep_all : bool
+        True: all points have their x, else the last two.
+    name : str
+        Name of the parameter, for messages.
     """
 
     newton: Newton
@@ -277,15 +292,40 @@ class Arclength:
         leave: Array | None = None,
         on_point: OnPoint | None = None,
     ) -> Branch:
-        """Follow the path through the solution at `start`, x0 of shape (n,) being the guess.
+        """Follow the path through the solution at `start`.
 
-        direction: sign of the first change of the parameter. leave: (n + 1,) instead, how x0, a
-        solution, and the parameter change in the beginning: off a bifurcation.
-        derivative(parameter, x): dR/dp, shape (n,). on_point: called after each converged point.
-        Start must not be a limit point.
-        The path ends CONVERGED where the parameter leaves `within` (the last point lies exactly
-        on the bound) or when `until` is true of the branch so far; MAX_ITERATIONS at max_points,
-        unless no other end was asked for. Raises ValueError if start is not within.
+        Parameters
+        ----------
+        problem_at : callable
+            Function of the parameter that returns the problem.
+        start : float
+            First parameter, not a limit point.
+        x0 : array (n,)
+            Initial guess at the start.
+        direction : float
+            Sign of the first change of the parameter.
+        within : tuple of float
+            The path ends on these bounds of the parameter.
+        until : callable, optional
+            Called with the branch so far; the path ends where it returns True.
+        derivative : callable, optional
+            Function of parameter and x that returns dR/dparameter (n,); a central difference if
+            left out.
+        leave : array (n + 1,), optional
+            In place of `direction`: initial change of x and parameter, off a bifurcation.
+        on_point : callable, optional
+            Called with each converged Point.
+
+        Returns
+        -------
+        Branch
+            CONVERGED at a bound or by `until`; MAX_ITERATIONS at `max_points`, if another end was
+            requested.
+
+        Raises
+        ------
+        ValueError
+            `start` lies outside `within`.
         """
         if not within[0] <= start <= within[1]:
             raise ValueError(f"start {start} lies outside {within}")
@@ -298,7 +338,27 @@ class Arclength:
         )
 
     def response(self, problem_at: ProblemAt, start: float, x: Array) -> Array:
-        """dx/dparameter, (n,), of the path through a solution x, (n,); raises SingularMatrix."""
+        """Return dx/dparameter of the path through a solution.
+
+        Parameters
+        ----------
+        problem_at : callable
+            Function of the parameter that returns the problem.
+        start : float
+            Parameter.
+        x : array (n,)
+            Solution there.
+
+        Returns
+        -------
+        array (n,)
+            The derivative.
+
+        Raises
+        ------
+        SingularMatrix
+            At a limit point or bifurcation.
+        """
         return self._path(problem_at, None).response(np.append(x, start), self.newton.linear)
 
     def _path(self, problem_at: ProblemAt, derivative: Derivative | None) -> _Path:

@@ -25,12 +25,27 @@ _ROUNDING = 1e-9  # a step this close to a waypoint, relatively, goes there
 
 @dataclass(frozen=True)
 class StepRule:
-    """Step control by iteration count; lengths > 0, in units of the parameter or arc length.
+    """Step control by the number of iterations.
 
-    first: length of the first step; smallest: a failed step is not cut below it;
-    largest: no step is longer; growth: largest ratio of successive steps;
-    cut: factor after a failure (its square after a wild one), and least ratio after a success;
-    target_iterations: Newton iterations at which the step stays as it is.
+    Parameters
+    ----------
+    first : float
+        Length of the first step, in units of the parameter or arc length.
+    smallest : float
+        A failed step is not cut below it.
+    largest : float
+        Length of the longest step.
+    growth : float
+        Largest ratio of successive steps.
+    cut : float
+        Factor after a failure, its square after a divergence, and least ratio after a success.
+    target_iterations : int
+        Newton iterations at which the step keeps its length.
+
+    Raises
+    ------
+    ValueError
+        Not 0 < smallest <= first <= largest, or a factor is not allowed.
     """
 
     first: float
@@ -48,12 +63,38 @@ class StepRule:
             raise ValueError(f"need 0 < cut < 1 <= growth and target_iterations >= 1, got {self}")
 
     def scaled(self, unit: float) -> StepRule:
-        """The rule with its lengths in other units, of which one is `unit` of the new ones."""
+        """Return the rule with its lengths in another unit.
+
+        Parameters
+        ----------
+        unit : float
+            Length of the present unit in the new one.
+
+        Returns
+        -------
+        StepRule
+            The rule.
+        """
         first, smallest, largest = (unit * a for a in (self.first, self.smallest, self.largest))
         return replace(self, first=first, smallest=smallest, largest=largest)
 
     def after_success(self, step: float, taken: float, iterations: int) -> float:
-        """Next step when `taken`, possibly shortened from `step` by a waypoint, has converged."""
+        """Return the next step after a converged one.
+
+        Parameters
+        ----------
+        step : float
+            Length that was proposed.
+        taken : float
+            Length of the step, which a waypoint may have shortened.
+        iterations : int
+            Newton iterations.
+
+        Returns
+        -------
+        float
+            Length.
+        """
         factor = self.target_iterations / max(iterations, 1)
         proposal = taken * min(max(factor, self.cut), self.growth)
         if iterations <= self.target_iterations:
@@ -61,7 +102,20 @@ class StepRule:
         return min(max(proposal, self.smallest), self.largest)
 
     def after_failure(self, taken: float, status: Status) -> float:
-        """Next step when `taken` has failed; it may come out below `smallest`: then give up."""
+        """Return the next step after a failed one.
+
+        Parameters
+        ----------
+        taken : float
+            Length of the failed step.
+        status : Status
+            Reason.
+
+        Returns
+        -------
+        float
+            Length; below `smallest` the path ends.
+        """
         wild = status in (Status.DIVERGED, Status.NOT_FINITE)
         return taken * (self.cut**2 if wild else self.cut)
 
@@ -337,14 +391,22 @@ def followed(way: Way, steps: StepRule, log: Record) -> Branch:
 
 @dataclass(frozen=True)
 class Continuation:
-    """Natural-parameter continuation with an adaptive step.
+    """Continuation in a parameter: one Newton solution for each step.
 
-    newton: the corrector; steps: the step rule, lengths in units of the parameter (which the
-    caller may have transformed, for instance to log U); predictor: "secant" through the last two
-    points, "parabola" through the last three (the secant until there are three), "previous" point,
-    or a guess; keep_all: keep x at every point, not just the last two;
-    name: what messages call the parameter; starter: the corrector of the start, which has no
-    predictor and may deserve more iterations than a step that is better cut (None: the same).
+    Parameters
+    ----------
+    newton : Newton
+        Solver of the steps.
+    steps : StepRule
+        Step control, in units of the parameter.
+    predictor : str or callable
+        Initial guess of a step from the previous points.
+    starter : Newton, optional
+        Solver at the start, if it is another one.
+    keep_all : bool
+        True: all points have their x, else the last two.
+    name : str
+        Name of the parameter, for messages.
     """
 
     newton: Corrector
@@ -365,12 +427,34 @@ class Continuation:
         on_point: OnPoint | None = None,
         previous: Point | None = None,
     ) -> Branch:
-        """Solve problem_at(parameter) from start to stop, either of which may be the larger.
+        """Follow the path from `start` to `stop`.
 
-        x0: (n,) guess at start. waypoints: parameters in [start, stop], any order, hit exactly
-        (as stop is). on_point: called after each converged point. previous: a converged point
-        before start, from which the first secant is drawn when a path is resumed. Raises
-        ValueError for waypoints that are out of range or not finite.
+        Parameters
+        ----------
+        problem_at : callable
+            Function of the parameter that returns the problem.
+        start : float
+            First parameter.
+        stop : float
+            Last parameter.
+        x0 : array (n,)
+            Initial guess at the start.
+        waypoints : iterable of float
+            Parameters that are points of the path.
+        on_point : callable, optional
+            Called with each converged Point.
+        previous : Point, optional
+            A point before the start, for the predictor.
+
+        Returns
+        -------
+        Branch
+            CONVERGED if the end was reached.
+
+        Raises
+        ------
+        ValueError
+            A parameter is not finite or lies outside.
         """
         behind = [] if previous is None else [previous]
         way = _ByParameter(self, problem_at, start, x0, goals_of(start, stop, waypoints), behind)

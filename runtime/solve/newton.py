@@ -136,23 +136,29 @@ class NewtonState:
 
 @dataclass(frozen=True)
 class Newton:
-    """Settings of Newton's method; `solve` is init, then step until terminate decides.
+    """Settings of Newton's method.
 
-    tolerance: converged when the dimensionless residual, `measure` of the problem or else its
-        `norm`, is at most this.
-    max_iterations: of one solve.
-    stagnation: rounding may hold the norm just above the tolerance. The solve also counts as
-        converged when a norm fails to decrease while it and its predecessor are below
-        stagnation * tolerance. Far from rounding Newton squares such norms, so not decreasing
-        there means that no digits are left; two decades are what cancellation in a stiff,
-        nearly incompressible solid costs. 1 switches it off.
-    divergence: diverged when the norm exceeds divergence * max(1, first norm). Large, because a
-        good step of a finite-deformation problem may raise the norm a thousandfold for once.
-    halvings: how often a step is halved while the residual is not finite (or, with line search,
-        does not decrease) before giving up.
-    line_search: off by default; semismooth problems (contact, cavitation) must take the full step
-        through a kink although the norm rises.
-    linear: solver of the linear systems.
+    Parameters
+    ----------
+    tolerance : float
+        Dimensionless residual at which the method has converged: `measure` of the problem, or its
+        `norm`.
+    max_iterations : int
+        Largest number of iterations.
+    stagnation : float
+        The method has also converged if the norm does not decrease while it and the previous one
+        are below stagnation * tolerance, where only rounding prevents it: a stiff, nearly
+        incompressible solid loses two decades by cancellation. 1 switches this off.
+    divergence : float
+        The method diverges if the norm exceeds divergence * max(1, first norm). Large, because a
+        good step of a finite deformation may raise the norm a thousandfold.
+    halvings : int
+        Number of halvings of a step while the residual is not finite or, with line search, does
+        not decrease.
+    line_search : bool
+        Semismooth problems (contact, cavitation) need full steps, although their norm may rise.
+    linear : LinearSolver
+        Solver of the linear systems.
     """
 
     tolerance: float = 1e-9
@@ -164,7 +170,20 @@ class Newton:
     linear: LinearSolver = field(default_factory=SuperLU)
 
     def solve(self, problem: NonlinearProblem, x0: Array) -> Solution:
-        """Solve R(x) = 0 from x0, shape (n,), which is left unchanged."""
+        """Solve R(x) = 0.
+
+        Parameters
+        ----------
+        problem : Problem
+            The equations, or any object with `residual`, `linearise`, `norm` and `step_limit`.
+        x0 : array (n,)
+            Initial guess; it is not changed.
+
+        Returns
+        -------
+        Solution
+            Converged or not; see `Solution.raise_for_status`.
+        """
         # An inadmissible trial is a handled value here, so numpy need not warn of it.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             state = self.terminate(self.init(problem, x0))
@@ -190,7 +209,20 @@ class Newton:
         )
 
     def init(self, problem: NonlinearProblem, x0: Array) -> NewtonState:
-        """The state before the first iteration."""
+        """Return the state before the first iteration.
+
+        Parameters
+        ----------
+        problem : Problem
+            The equations.
+        x0 : array (n,)
+            Initial guess.
+
+        Returns
+        -------
+        NewtonState
+            With the norm at x0.
+        """
         x = np.array(x0, dtype=np.float64)
         state = NewtonState(x, (norm_at(problem, x),))
         if math.isfinite(state.norms[0]):
@@ -199,7 +231,20 @@ class Newton:
         return _end(state, Status.NOT_FINITE, f"the residual at the start is not finite{where}")
 
     def step(self, problem: NonlinearProblem, state: NewtonState) -> NewtonState:
-        """One iteration: factorise, solve, advance; a failure is written into the state."""
+        """Return the state after one iteration: factorise, solve, advance.
+
+        Parameters
+        ----------
+        problem : Problem
+            The equations.
+        state : NewtonState
+            State before it.
+
+        Returns
+        -------
+        NewtonState
+            With the status of a failure, if it fails.
+        """
         r, K = problem.linearise(state.x)
         state = replace(state, factorisations=state.factorisations + 1)
         try:
@@ -209,7 +254,18 @@ class Newton:
         return self._advance(problem, state, dx, K)
 
     def terminate(self, state: NewtonState) -> NewtonState:
-        """The state with `status` set if the solve is over."""
+        """Return the state with its status, if the method has ended.
+
+        Parameters
+        ----------
+        state : NewtonState
+            State after an iteration.
+
+        Returns
+        -------
+        NewtonState
+            The state.
+        """
         norm = state.norms[-1]
         if state.status is not None:
             return state

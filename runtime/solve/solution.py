@@ -18,7 +18,7 @@ from softehl.runtime.arrays import Array
 
 
 class Status(enum.Enum):
-    """End of a solver or of a path; `advice` says what to try next."""
+    """End of a solver or of a path; `advice` has the likely causes and their remedies."""
 
     CONVERGED = "converged"
     MAX_ITERATIONS = "too many iterations"
@@ -34,7 +34,7 @@ class Status(enum.Enum):
 
     @property
     def advice(self) -> str:
-        """One or two sentences: the likely causes and their remedies (empty when converged)."""
+        """Likely causes and their remedies; empty when converged."""
         return _ADVICE[self]
 
 
@@ -72,9 +72,14 @@ _ADVICE = {
 
 
 class NotConverged(SoftehlError, RuntimeError):  # noqa: N818 (named after what it is)
-    """Raised for the outermost caller only; `result` is the Solution or Branch that failed.
+    """A path or a solution did not reach its end; the message has the reason and a remedy.
 
-    reached: the last state that was reached, where there is one (a study's Result).
+    Parameters
+    ----------
+    result : Solution or Branch
+        The one that failed.
+    reached : Result, optional
+        The last converged state of a study.
     """
 
     def __init__(self, result: Solution | Branch, reached: Any = None) -> None:
@@ -85,15 +90,26 @@ class NotConverged(SoftehlError, RuntimeError):  # noqa: N818 (named after what 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The end of one Newton solve, converged or not.
+    """End of one Newton solution, converged or not.
 
-    x: (n,) the last accepted iterate; empty (n = 0) once `forget` was called.
-    status, message: how it ended, in code and in words.
-    residual_norms: dimensionless norm at x0 and after each iteration (iterations + 1 values).
-    factorisations: matrices factorised, including one that turned out singular.
-    iterations: completed Newton iterations.
-    best: (n,) of a failed solve, the iterate of the least norm where that is not x.
-    rung: number of the corrector of a `Ladder` that this is the end of; others were tried before.
+    Attributes
+    ----------
+    x : array (n,)
+        Last accepted iterate; empty after `forget`.
+    status : Status
+        CONVERGED, or the reason of the failure.
+    message : str
+        The end in words.
+    residual_norms : tuple of float
+        Dimensionless norm at the start and after each iteration.
+    factorisations : int
+        Number of matrices that were factorised.
+    iterations : int
+        Number of iterations.
+    best : array (n,), optional
+        Of a failed solution, the iterate of the least norm, if that is not x.
+    rung : int
+        Number of the solver of a `Ladder` that ended; those before it failed.
     """
 
     x: Array = field(repr=False)
@@ -116,11 +132,28 @@ class Solution:
         return self.x if self.best is None else self.best
 
     def forget(self) -> Solution:
-        """Summary without the solution vector, which a long branch cannot afford."""
+        """Return the solution without its vectors.
+
+        Returns
+        -------
+        Solution
+            A copy with an empty x.
+        """
         return replace(self, x=np.empty(0), best=None)
 
     def raise_for_status(self) -> Solution:
-        """Return self if converged, else raise NotConverged: for the outermost caller only."""
+        """Return the solution if it converged.
+
+        Returns
+        -------
+        Solution
+            The solution itself.
+
+        Raises
+        ------
+        NotConverged
+            It did not converge.
+        """
         if not self.converged:
             raise NotConverged(self)
         return self
@@ -136,10 +169,21 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class LimitPoint:
-    """A fold of a branch: the parameter passes a `kind` ("maximum" or "minimum") at x, shape (n,).
+    """Limit point of a path: the parameter has a maximum or minimum.
 
-    `index` is the number of branch points before the fold. `located` is False if the corrector
-    failed during the search, so that parameter and x are only those of the nearer end of the step.
+    Attributes
+    ----------
+    parameter : float
+        Parameter, such as the load factor; `t` is the same.
+    x : array (n,)
+        Unknowns.
+    kind : str
+        "maximum" or "minimum".
+    index : int
+        Number of points of the path before it.
+    located : bool
+        False if the corrector failed during the search: parameter and x are then those of the
+        nearer end of the step.
     """
 
     parameter: float
@@ -150,19 +194,30 @@ class LimitPoint:
 
     @property
     def t(self) -> float:
-        """The parameter, as results of a study call it."""
+        """The parameter."""
         return self.parameter
 
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A followed path: every converged point, in order, and how it ended.
+    """A path: every converged point in order, and its end.
 
-    points: converged points; only the last two keep their x unless everything was asked for.
-    status, message: CONVERGED if the end was reached, else why not and which parameter was.
-    factorisations, iterations: totals that include failed attempts.
-    failures: the failed attempts (without x), in order; each made the step smaller.
-    limit_points: folds met on the way (arc length only).
+    Attributes
+    ----------
+    points : tuple of Point
+        Converged points; only the last two have their x unless all were requested.
+    status : Status
+        CONVERGED if the end was reached, else the reason.
+    message : str
+        The end in words.
+    factorisations : int
+        Total number, including failed attempts.
+    iterations : int
+        Total number, including failed attempts.
+    failures : tuple of Point
+        Failed attempts, without x; each made the step smaller.
+    limit_points : tuple of LimitPoint
+        Limit points (arc length only).
     """
 
     points: tuple[Point, ...]
@@ -193,21 +248,30 @@ class Branch:
 
     @property
     def last(self) -> Solution:
-        """Solution of the last converged point; IndexError if not even the first converged."""
+        """Solution of the last converged point; IndexError if there is none."""
         return self.points[-1].solution
 
     @property
     def end(self) -> Solution:
-        """Solution at the end of the path; where that was not reached, the last attempt (without x)
-        with the status and the message of the branch.
-        """
+        """Solution at the end of the path; of a failed path the last attempt, without x."""
         if self.converged:
             return self.last
         attempts = self.failures or self.points
         return replace(attempts[-1].solution, status=self.status, message=self.message)
 
     def raise_for_status(self) -> Branch:
-        """Return self if the end was reached, else raise NotConverged (outermost caller only)."""
+        """Return the branch if its end was reached.
+
+        Returns
+        -------
+        Branch
+            The branch itself.
+
+        Raises
+        ------
+        NotConverged
+            The end was not reached.
+        """
         if not self.converged:
             raise NotConverged(self)
         return self

@@ -14,11 +14,18 @@ from softehl.runtime.solve.solution import Solution
 
 @dataclass(frozen=True)
 class Ladder:
-    """Escalation within one solve; itself a corrector.
+    """Solvers in order of cost; each continues where the previous one fails.
 
-    rungs: correctors, the cheapest first. A rung begins with the best iterate of the one before it
-    if the residual is smaller there than at the start, else at the start. Rungs that are `Informed`
-    are told of a solution that another rung found.
+    Parameters
+    ----------
+    rungs : tuple of solvers
+        Such as `Newton`, the cheapest first. A solver starts from the best iterate of the previous
+        one if its residual is smaller than at the start.
+
+    Raises
+    ------
+    ValueError
+        There is no solver.
     """
 
     rungs: tuple[Corrector, ...]
@@ -29,8 +36,19 @@ class Ladder:
             raise ValueError("a ladder needs at least one corrector")
 
     def solve(self, problem: Any, x0: Array) -> Solution:
-        """Solution of R(x) = 0 from x0, (n,), whose `rung` says which corrector found it; its
-        factorisations and iterations are those of all that were tried.
+        """Solve R(x) = 0.
+
+        Parameters
+        ----------
+        problem : Problem
+            The equations.
+        x0 : array (n,)
+            Initial guess.
+
+        Returns
+        -------
+        Solution
+            With the number of the solver as `rung`, and iterations of all of them.
         """
         start, factorisations, iterations, words = x0, 0, 0, list[str]()
         for number, corrector in enumerate(self.rungs):

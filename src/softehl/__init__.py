@@ -11,37 +11,80 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softehl.errors import SoftehlError
+from softehl.errors import SoftehlError, UnknownNameError
 
 if TYPE_CHECKING:
     from softehl.__main__ import main
+    from softehl.cases.harness.errors import BadInput
+    from softehl.cases.harness.parameters import Parameters
     from softehl.cases.harness.processes import processes
     from softehl.cases.harness.sweep import Curve
     from softehl.cases.oring import run_oring
     from softehl.cases.seal.gland.parameters import ORing, Seal
-    from softehl.cases.seal.states.state import FilmState, Observer, Outcome, Silent
+    from softehl.cases.seal.states.state import (
+        ContactState,
+        FilmState,
+        Observer,
+        Outcome,
+        Profile,
+        Silent,
+    )
     from softehl.cases.shipped import solve_cases
+    from softehl.codegen.abi import TargetError
+    from softehl.codegen.graph.partials import DifferentiationError
     from softehl.codegen.language import kinematics
-    from softehl.codegen.language.complaints import ModelError
+    from softehl.codegen.language.complaints import ModelError, ModelWarning
     from softehl.codegen.language.definition import Definition
     from softehl.codegen.language.elements import quadrature, shapes
-    from softehl.codegen.language.elements.cells import element
-    from softehl.codegen.language.material import Law, material
+    from softehl.codegen.language.elements.cells import Element, element
+    from softehl.codegen.language.elements.quadrature import QuadratureRule
+    from softehl.codegen.language.fields import Fields
+    from softehl.codegen.language.material import Law, Material, material
     from softehl.codegen.language.model import Model
     from softehl.codegen.language.pages import Page, page
+    from softehl.codegen.tools.build import BuildError
+    from softehl.codegen.tools.location import CacheError
+    from softehl.codegen.tools.model_text import ModelFileError
+    from softehl.codegen.tools.samples import NoStateError
+    from softehl.runtime.analyses.bifurcation import Bifurcation, MissedBifurcations
+    from softehl.runtime.analyses.buckling import Buckling
+    from softehl.runtime.analyses.callbacks import Series
+    from softehl.runtime.analyses.homogenisation import Cell, Homogenised
+    from softehl.runtime.analyses.load_stepping import LoadPath
+    from softehl.runtime.analyses.motion import EnergyGain, Motion
     from softehl.runtime.definition.problem_definition import StudyError
     from softehl.runtime.discretisation.assembly import Assembler
     from softehl.runtime.discretisation.dofmap import DofLayout
     from softehl.runtime.discretisation.element_blocks import ElementBlock
     from softehl.runtime.discretisation.problem import Problem
     from softehl.runtime.discretisation.problem_checks import ProblemError
-    from softehl.runtime.kernels.kernel import Kernel, KernelError
+    from softehl.runtime.equations.stability import UnstableState
+    from softehl.runtime.equations.system import System
+    from softehl.runtime.fit.jax_operation import Operation
+    from softehl.runtime.fit.least_squares import Fit
+    from softehl.runtime.fit.objective import Objective
+    from softehl.runtime.kernels.kernel import Kernel
+    from softehl.runtime.kernels.kernel_call import ArgumentError
+    from softehl.runtime.kernels.shared_library import KernelError
     from softehl.runtime.mesh.mesh import Mesh, MeshError
-    from softehl.runtime.results.result import Result
+    from softehl.runtime.mpi import MissingPetsc
+    from softehl.runtime.parallel.matrix_free import MatrixFree
+    from softehl.runtime.parallel.petsc import Petsc
+    from softehl.runtime.results.result import Modes, ModeShape, Result
     from softehl.runtime.solve.arclength import Arclength
     from softehl.runtime.solve.continuation import Continuation, StepRule
+    from softehl.runtime.solve.eigen import NoModes
+    from softehl.runtime.solve.linear.direct import MissingBackend
+    from softehl.runtime.solve.linear.linear_solver import SingularMatrix
     from softehl.runtime.solve.newton import Newton
-    from softehl.runtime.solve.solution import Branch, NotConverged, Solution, Status
+    from softehl.runtime.solve.solution import (
+        Branch,
+        LimitPoint,
+        NotConverged,
+        Point,
+        Solution,
+        Status,
+    )
     from softehl.runtime.solve.solver_cascade import Ladder
     from softehl.runtime.study import Study
 
@@ -52,42 +95,84 @@ if not (Path(__file__).parent / "runtime").is_dir():
 
 _PUBLIC = {
     "Arclength": "softehl.runtime.solve.arclength",
+    "ArgumentError": "softehl.runtime.kernels.kernel_call",
     "Assembler": "softehl.runtime.discretisation.assembly",
+    "BadInput": "softehl.cases.harness.errors",
+    "Bifurcation": "softehl.runtime.analyses.bifurcation",
     "Branch": "softehl.runtime.solve.solution",
+    "Buckling": "softehl.runtime.analyses.buckling",
+    "Cell": "softehl.runtime.analyses.homogenisation",
+    "ContactState": "softehl.cases.seal.states.state",
     "Continuation": "softehl.runtime.solve.continuation",
     "Curve": "softehl.cases.harness.sweep",
     "DofLayout": "softehl.runtime.discretisation.dofmap",
     "ElementBlock": "softehl.runtime.discretisation.element_blocks",
+    "EnergyGain": "softehl.runtime.analyses.motion",
     "FilmState": "softehl.cases.seal.states.state",
+    "Fit": "softehl.runtime.fit.least_squares",
+    "Homogenised": "softehl.runtime.analyses.homogenisation",
     "Kernel": "softehl.runtime.kernels.kernel",
     "KernelError": "softehl.runtime.kernels.shared_library",
     "Ladder": "softehl.runtime.solve.solver_cascade",
+    "LimitPoint": "softehl.runtime.solve.solution",
+    "LoadPath": "softehl.runtime.analyses.load_stepping",
+    "MatrixFree": "softehl.runtime.parallel.matrix_free",
     "Mesh": "softehl.runtime.mesh.mesh",
     "MeshError": "softehl.runtime.mesh.mesh",
+    "MissedBifurcations": "softehl.runtime.analyses.bifurcation",
+    "MissingBackend": "softehl.runtime.solve.linear.direct",
+    "MissingPetsc": "softehl.runtime.mpi",
+    "ModeShape": "softehl.runtime.results.result",
+    "Modes": "softehl.runtime.results.result",
+    "Motion": "softehl.runtime.analyses.motion",
     "Newton": "softehl.runtime.solve.newton",
+    "NoModes": "softehl.runtime.solve.eigen",
     "NotConverged": "softehl.runtime.solve.solution",
     "ORing": "softehl.cases.seal.gland.parameters",
+    "Objective": "softehl.runtime.fit.objective",
     "Observer": "softehl.cases.seal.states.state",
+    "Operation": "softehl.runtime.fit.jax_operation",
     "Outcome": "softehl.cases.seal.states.state",
+    "Parameters": "softehl.cases.harness.parameters",
+    "Petsc": "softehl.runtime.parallel.petsc",
+    "Point": "softehl.runtime.solve.solution",
     "Problem": "softehl.runtime.discretisation.problem",
     "ProblemError": "softehl.runtime.discretisation.problem_checks",
+    "Profile": "softehl.cases.seal.states.state",
     "Result": "softehl.runtime.results.result",
     "Seal": "softehl.cases.seal.gland.parameters",
+    "Series": "softehl.runtime.analyses.callbacks",
     "Silent": "softehl.cases.seal.states.state",
+    "SingularMatrix": "softehl.runtime.solve.linear.linear_solver",
     "Solution": "softehl.runtime.solve.solution",
     "Status": "softehl.runtime.solve.solution",
     "StepRule": "softehl.runtime.solve.continuation",
     "Study": "softehl.runtime.study",
     "StudyError": "softehl.runtime.definition.problem_definition",
+    "System": "softehl.runtime.equations.system",
+    "UnstableState": "softehl.runtime.equations.stability",
     "main": "softehl.__main__",
     "processes": "softehl.cases.harness.processes",
     "run_oring": "softehl.cases.oring",
     "solve_cases": "softehl.cases.shipped",
 }
 _MODELLING = {
+    "BuildError": "softehl.codegen.tools.build",
+    "CacheError": "softehl.codegen.tools.location",
     "Definition": "softehl.codegen.language.definition",
+    "DifferentiationError": "softehl.codegen.graph.partials",
+    "Element": "softehl.codegen.language.elements.cells",
+    "Fields": "softehl.codegen.language.fields",
+    "Law": "softehl.codegen.language.material",
+    "Material": "softehl.codegen.language.material",
     "Model": "softehl.codegen.language.model",
     "ModelError": "softehl.codegen.language.complaints",
+    "ModelFileError": "softehl.codegen.tools.model_text",
+    "ModelWarning": "softehl.codegen.language.complaints",
+    "NoStateError": "softehl.codegen.tools.samples",
+    "Page": "softehl.codegen.language.pages",
+    "QuadratureRule": "softehl.codegen.language.elements.quadrature",
+    "TargetError": "softehl.codegen.abi",
     "element": "softehl.codegen.language.elements.cells",
     "kinematics": "softehl.codegen.language.kinematics:",
     "material": "softehl.codegen.language.material",
@@ -99,37 +184,81 @@ _MODELLING = {
 
 __all__ = [
     "Arclength",
+    "ArgumentError",
     "Assembler",
+    "BadInput",
+    "Bifurcation",
     "Branch",
+    "Buckling",
+    "BuildError",
+    "CacheError",
+    "Cell",
+    "ContactState",
     "Continuation",
     "Curve",
     "Definition",
+    "DifferentiationError",
     "DofLayout",
+    "Element",
     "ElementBlock",
+    "EnergyGain",
+    "Fields",
     "FilmState",
+    "Fit",
+    "Homogenised",
     "Kernel",
     "KernelError",
     "Ladder",
+    "Law",
+    "LimitPoint",
+    "LoadPath",
+    "Material",
+    "MatrixFree",
     "Mesh",
     "MeshError",
+    "MissedBifurcations",
+    "MissingBackend",
+    "MissingPetsc",
+    "ModeShape",
     "Model",
     "ModelError",
+    "ModelFileError",
+    "ModelWarning",
+    "Modes",
+    "Motion",
     "Newton",
+    "NoModes",
+    "NoStateError",
     "NotConverged",
     "ORing",
+    "Objective",
     "Observer",
+    "Operation",
     "Outcome",
+    "Page",
+    "Parameters",
+    "Petsc",
+    "Point",
     "Problem",
     "ProblemError",
+    "Profile",
+    "QuadratureRule",
     "Result",
     "Seal",
+    "Series",
     "Silent",
+    "SingularMatrix",
     "SoftehlError",
     "Solution",
     "Status",
     "StepRule",
     "Study",
     "StudyError",
+    "SymPyNeededError",
+    "System",
+    "TargetError",
+    "UnknownNameError",
+    "UnstableState",
     "element",
     "kinematics",
     "load_kernel",

@@ -76,7 +76,7 @@ def test_cook_in_plane_strain_takes_35_lines() -> None:
 
 
 # free out of its plane, as deal.II's panel is, where it would buckle
-@pytest.mark.filterwarnings("ignore::softehl.runtime.equations.stability.Unstable")
+@pytest.mark.filterwarnings("ignore::softehl.runtime.equations.stability.UnstableState")
 @pytest.mark.slow
 def test_cook_with_quadratic_elements(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from softehl import Mesh, Study

@@ -12,7 +12,7 @@ from scipy.special import ellipe, ellipk
 
 import softehl
 from softehl import Definition, Model, quadrature
-from softehl.runtime.analyses.bifurcation import Blind, place
+from softehl.runtime.analyses.bifurcation import MissedBifurcations, place
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.study import Study, StudyError
 from tests.runtime.test_follow import shallow
@@ -89,7 +89,7 @@ def test_what_is_nearly_singular_is_looked_for_with_contact() -> None:
 
 
 def test_a_path_that_cannot_see_bifurcations_says_so() -> None:
-    with pytest.warns(Blind, match="no symmetric, regular tangent at load factor"):
+    with pytest.warns(MissedBifurcations, match="no symmetric, regular tangent at load factor"):
         path = resting().follow(step=0.5, until=lambda r: r.t > 1.0, detect="bifurcation")
     assert path.results[-1].unstable is None
 

@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 import softehl
 from softehl.runtime.discretisation.mass import lumped, mass_matrices
 from softehl.runtime.equations.mass_matrix import mass_matrix
-from softehl.runtime.equations.stability import Unstable
+from softehl.runtime.equations.stability import UnstableState
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.results.result import Result
@@ -348,7 +348,7 @@ def test_a_ring_buckles_under_a_pressure_that_ends_at_supports() -> None:
     study.pressure("top", levy)
     assert study.buckling(1).factors[0] == pytest.approx(1.0, rel=0.01)
     assert study.solve(until=0.9).unstable == 0
-    with pytest.warns(Unstable, match="along one direction"):
+    with pytest.warns(UnstableState, match="along one direction"):
         assert study.solve(until=1.1).unstable == 1
 
 
@@ -380,10 +380,10 @@ def test_a_column_beyond_its_load_is_not_silent() -> None:
     study = column()
     below = study.solve(until=0.98 * EULER)
     assert below.unstable == 0
-    with pytest.warns(Unstable, match="load factor .* is unstable: .* one direction"):
+    with pytest.warns(UnstableState, match="load factor .* is unstable: .* one direction"):
         beyond = study.solve(until=1.02 * EULER)
     assert beyond.unstable == 1
-    with pytest.warns(Unstable, match="2 independent directions"):
+    with pytest.warns(UnstableState, match="2 independent directions"):
         assert study.solve(until=9.1 * EULER).unstable == 2
     modes = beyond.modes(2, mass=MASS)
     assert modes.squares[0] < 0.0 < modes.squares[1]
@@ -394,7 +394,7 @@ def test_a_body_of_negative_stiffness_is_unstable_along_all_its_unknowns() -> No
     study = Study(Mesh.rectangle(1.0, 1.0, cells=(2, 2)))
     study.add("body", rubber, mu=-1.0, lame=-1.0)
     study.fix("left", u_x=0, u_y=0)  # held nodes are no other field: nothing is a multiplier
-    with pytest.warns(Unstable, match="12 independent directions"):
+    with pytest.warns(UnstableState, match="12 independent directions"):
         assert at_rest(study).unstable == 12
 
 
@@ -450,9 +450,9 @@ def test_condensed_and_mixed_columns_buckle() -> None:
     study.fix("left", u_x=0, u_y=0)
     study.load("right", u_x=-1.0 / HEIGHT)
     assert study.solve(until=0.97 * EULER).unstable == 0
-    with pytest.warns(Unstable, match="one direction"):
+    with pytest.warns(UnstableState, match="one direction"):
         assert study.solve(until=1.03 * EULER).unstable == 1
-    with pytest.warns(Unstable, match="one direction"):
+    with pytest.warns(UnstableState, match="one direction"):
         assert column(mixed, mu=YOUNG / 2, K=YOUNG).solve(until=1.6 * EULER).unstable == 1
 
 

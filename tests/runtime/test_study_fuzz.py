@@ -23,7 +23,7 @@ VALUES = st.one_of(st.floats(-0.2, 0.2), st.sampled_from([float("nan"), float("i
 
 
 @pytest.mark.filterwarnings(
-    "ignore::softehl.runtime.equations.stability.Unstable"
+    "ignore::softehl.runtime.equations.stability.UnstableState"
 )  # stretched by 1e30
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(

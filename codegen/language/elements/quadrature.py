@@ -18,7 +18,17 @@ _DIGITS = 100
 
 @dataclass(frozen=True)
 class QuadratureRule:
-    """`points` (one tuple of parent coordinates each) and `weights`, exact SymPy numbers."""
+    """Points and weights of a reference cell, exact.
+
+    Attributes
+    ----------
+    dimension : int
+        Dimension of the cell.
+    points : tuple of tuple of Expr
+        Coordinates of each point.
+    weights : tuple of Expr
+        Weight of each point.
+    """
 
     dimension: int
     points: tuple[tuple[sp.Expr, ...], ...]
@@ -29,7 +39,13 @@ class QuadratureRule:
         return f"<QuadratureRule: {len(self.weights)} points in {self.dimension}-D>"
 
     def rows(self) -> list[list[Fraction]]:
-        """(coordinates..., weight) of each point, to 60 digits or more."""
+        """Return the rule in rational numbers.
+
+        Returns
+        -------
+        list of list of Fraction
+            (coordinates, weight) of each point, to 60 digits or more.
+        """
         pairs = zip(self.points, self.weights, strict=True)
         return [[close_rational(x) for x in (*p, w)] for p, w in pairs]
 
