@@ -27,8 +27,8 @@ import numpy as np
 from benchmarks.field_pages import EXAMPLES, PAGES
 from softehl.codegen import pipeline
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.pages import Form
-from softehl.codegen.tools import build, product
+from softehl.codegen.language.weak_form import Form
+from softehl.codegen.tools import build, output_files
 from softehl.runtime.mesh.cells import CELLS
 
 ELEMENTS = 256
@@ -50,7 +50,7 @@ def built(material: str, cell: str, form: Form | None, folder: Path) -> Built:
     """Derive and compile, in series. form: None for that which is taken by itself."""
     start = time.process_time()
     d = replace(PAGES[material], form=form).definition(cell)
-    files = product.files([pipeline.compile_model(d)])
+    files = output_files.files([pipeline.compile_model(d)])
     derive = time.process_time() - start
     folder.mkdir(parents=True)
     for name, text in files.items():

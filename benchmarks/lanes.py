@@ -36,11 +36,11 @@ def write(names: Sequence[str], folder: Path, target: str) -> None:
     """The C of some pages by the generator that is first on the path, and what it cost."""
     from softehl.codegen import pipeline
     from softehl.codegen.abi import Target
-    from softehl.codegen.tools import product, user
+    from softehl.codegen.tools import model_loader, output_files
 
-    models = {d.name: d for d in user.definitions(PAGES)}
+    models = {d.name: d for d in model_loader.definitions(PAGES)}
     kernels = [pipeline.compile_model(models[name], Target(target)) for name in names]
-    for name, text in product.files(kernels).items():
+    for name, text in output_files.files(kernels).items():
         (folder / name).write_text(text, encoding="utf-8")
     for kernel in kernels:
         f = kernel.functions["tangent"]
@@ -69,11 +69,12 @@ def made(names: Sequence[str], folder: Path, target: str, checkout: Path | None)
 
 def states(name: str) -> tuple[tuple[int, int, int], list[Any]]:
     """Sizes and arrays of a batch whose neighbours take different ways."""
-    from softehl.codegen.tools import samples, user
+    from softehl.codegen.tools import model_loader
+    from softehl.codegen.verify import random_states
 
-    d = next(d for d in user.definitions(PAGES) if d.name == name)
+    d = next(d for d in model_loader.definitions(PAGES) if d.name == name)
     rng, rows = np.random.default_rng(7), []
-    for s in samples.admissible(d, 4):
+    for s in random_states.admissible(d, 4):
         for _ in range(DIFFERENT // 4):
             factor = rng.uniform(0.2, 1.2)
             dofs = [v * factor for v in s.dofs]

@@ -7,10 +7,10 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.elements import quadrature
+from softehl.codegen.elements.cells import element
 from softehl.codegen.language import kinematics as kin
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.elements.cells import element
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
 

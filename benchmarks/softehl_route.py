@@ -17,9 +17,9 @@ from sympy.core.cache import clear_cache
 from benchmarks.candidate import ENTRY, Candidate, Stopwatch
 from benchmarks.problem import Case
 from softehl.codegen import abi, pipeline
-from softehl.codegen.emit import source
+from softehl.codegen.elements import quadrature, shapes
+from softehl.codegen.emit import c_source
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import solid
 from softehl.codegen.tools import build
@@ -37,12 +37,12 @@ def derive(case: Case, route: str) -> Candidate:
     definition = page()
     function = pipeline.compile_task(definition, task)
     name = definition.name
-    header = source.header([abi.function_name(name, task)])
-    text = source.source(definition, [function.text])
+    header = c_source.header([abi.function_name(name, task)])
+    text = c_source.source(definition, [function.text])
     seconds = watch.seconds()
     if route == "one lane":
         header = header.replace("#define SOFTEHL_LANES 4", "#define SOFTEHL_LANES 1")
-    files = {f"{name}.c": text, source.HEADER: header, "entry.c": _entry(name, task)}
+    files = {f"{name}.c": text, c_source.HEADER: header, "entry.c": _entry(name, task)}
     flags = tuple(f for f in build.FLAGS if f not in ("-fPIC", "-shared"))
     return Candidate("softehl", route, case, seconds, files, own_flags=flags)
 
@@ -54,7 +54,7 @@ def _entry(name: str, task: abi.Task) -> str:
     names = [a.split()[-1].strip("*") for a in " ".join(abi.ARGUMENTS).split(",")]
     arguments = ", ".join(given.get(n, "0") for n in names)
     call = f"    {abi.function_name(name, task)}({arguments});"
-    return f'#include "{source.HEADER}"\n\n{ENTRY}\n{{\n{call}\n}}\n'
+    return f'#include "{c_source.HEADER}"\n\n{ENTRY}\n{{\n{call}\n}}\n'
 
 
 # The formula as the paper prints it: no named intermediate, no interface, nothing rearranged.

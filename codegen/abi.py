@@ -124,6 +124,14 @@ class TargetError(SoftehlError, ValueError):
     """The page has something that the target cannot hold; the message names it."""
 
 
+class BuildError(SoftehlError, RuntimeError):
+    """The C compiler failed; the message holds the reason, the command line and its output."""
+
+
+class NoCompilerError(BuildError):
+    """There is no C compiler: $CC is not set, and there is no cc on the PATH."""
+
+
 class Target(StrEnum):
     """For whom a kernel is printed."""
 
@@ -150,7 +158,7 @@ VERTEX_ORDER = {
 }
 """Node of basix's Lagrange element for each node, by (nodes, parent dimension): all there are.
 
-The nodes are in the order of `language.elements.cells`. The elements quad8 and hex20 have no
+The nodes are in the order of `elements.cells`. The elements quad8 and hex20 have no
 counterpart: basix knows their functions, but not by values at nodes.
 """
 

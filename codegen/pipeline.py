@@ -26,26 +26,25 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from softehl.codegen.abi import DESIGN, ROLLED, Target, Task, derivative_task
-from softehl.codegen.derive import points as at_points
-from softehl.codegen.derive import structure, variants
-from softehl.codegen.derive.outputs import Entry, placed
-from softehl.codegen.derive.structure import Structure
-from softehl.codegen.derive.variants import Variant
-from softehl.codegen.emit import lane_routines as emit_lane_routines
-from softehl.codegen.emit import lanes as emit_lanes
-from softehl.codegen.emit import routines as emit_routines
-from softehl.codegen.emit import simd as emit_simd
-from softehl.codegen.emit import source as emit_source
-from softehl.codegen.emit import ufcx as emit_ufcx
-from softehl.codegen.emit.order import arranged
-from softehl.codegen.emit.points import constants as emit_constants
-from softehl.codegen.emit.points import factored as emit_factored
-from softehl.codegen.emit.points import family as emit_points
-from softehl.codegen.emit.points.choice import Choice, choose
-from softehl.codegen.emit.points.function import Outputs
-from softehl.codegen.emit.points.layout import Layout, Needs
-from softehl.codegen.emit.runs import arranged_plan
-from softehl.codegen.emit.schedule import Schedule, is_straight, schedule, straight_line
+from softehl.codegen.derive import point_outputs, potential_structure, task_outputs
+from softehl.codegen.derive.output_entries import Entry, placed
+from softehl.codegen.derive.potential_structure import Structure
+from softehl.codegen.derive.task_outputs import Variant
+from softehl.codegen.emit import (
+    c_routines,
+    c_source,
+    simd_kernel,
+    simd_printer,
+    simd_routines,
+    ufcx,
+)
+from softehl.codegen.emit.basic_blocks import arranged_plan
+from softehl.codegen.emit.code_motion import Schedule, is_straight, schedule, straight_line
+from softehl.codegen.emit.instruction_scheduling import arranged
+from softehl.codegen.emit.points import cell_constants, point_kernel, sum_factored_product
+from softehl.codegen.emit.points.point_function import Outputs
+from softehl.codegen.emit.points.point_kernel import Choice, choose
+from softehl.codegen.emit.points.point_layout import Layout, Needs
 from softehl.codegen.graph.graph import Routine
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
@@ -109,17 +108,17 @@ class KernelSource:
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
     """All kernels of one model; `codegen.abi` says what each target is."""
-    tasks = variants.tasks(definition)
+    tasks = task_outputs.tasks(definition)
     if target is Target.UFCX:
-        tasks = emit_ufcx.tasks(definition, tasks)
+        tasks = ufcx.tasks(definition, tasks)
     if target is Target.SIMD and form(definition).at_points:
         return _with_action(_at_points(definition, tasks))
     functions = {t: compile_task(definition, t, target) for t in tasks}
     if target is Target.UFCX:
         texts = [f.text for f in functions.values()]
         used = dict.fromkeys(r for f in functions.values() for r in f.routines)
-        before = emit_routines.texts(definition, used)
-        return KernelSource(definition, emit_ufcx.source(definition, texts, before), functions)
+        before = c_routines.texts(definition, used)
+        return KernelSource(definition, ufcx.source(definition, texts, before), functions)
     design = [f for t, f in functions.items() if t in DESIGN]
     others = [f for t, f in functions.items() if t not in DESIGN]
     if {r for f in others for r in f.routines} & {r for f in design for r in f.routines}:
@@ -134,19 +133,19 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
 def _with_action(made: KernelSource) -> KernelSource:
     """With a file for products by sum factorisation, where the page offers products on such a cell.
 
-    See `emit.points.factored`.
+    See `emit.points.sum_factored_product`.
     """
     d = made.definition
     if d.point is None or Task.PRODUCT not in made.functions:
         return made
     layout = Layout(d, d.point)
-    if not emit_factored.fits(layout):
+    if not sum_factored_product.fits(layout):
         return made
     outputs, plan, called = _ordered(layout, Task.PRODUCT)
-    action = emit_factored.Factored(layout, outputs, plan)
-    before = emit_lane_routines.texts(layout.site, dict.fromkeys(called))
+    action = sum_factored_product.Factored(layout, outputs, plan)
+    before = simd_routines.texts(layout.site, dict.fromkeys(called))
     text = action.text(before)
-    text = action.text([*emit_lanes.wrappers(text), *before])
+    text = action.text([*simd_printer.wrappers(text), *before])
     shared = {**made.shared, f"{d.name}_action.c": text}
     return replace(made, shared=shared, kept=len(action.kept.names))
 
@@ -156,7 +155,9 @@ def form(d: Definition) -> Choice:
     if d.point is None:
         return Choice(False, "no page of fields")
     site = d.point.definition
-    strange = [t for t, _ in d.derivatives if at_points.argument(site, derivative_task(t)) is None]
+    strange = [
+        t for t, _ in d.derivatives if point_outputs.argument(site, derivative_task(t)) is None
+    ]
     if strange:
         return Choice(False, f"a derivative by {strange[0]}, which a point does not know")
     attempt = _moduli(site, Task.TANGENT)
@@ -166,7 +167,7 @@ def form(d: Definition) -> Choice:
 
 def _moduli(site: Definition, task: str) -> Attempt:
     """Outputs of a task at a point."""
-    return _attempt(site, Variant("at a point", at_points.outputs(site, task)), unrolled=True)
+    return _attempt(site, Variant("at a point", point_outputs.outputs(site, task)), unrolled=True)
 
 
 def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
@@ -178,12 +179,12 @@ def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
     for some in ([t for t in tasks if t not in DESIGN], [t for t in tasks if t in DESIGN]):
         texts = [functions[t].text for t in some]
         called = dict.fromkeys(r for t in some for r in functions[t].routines)
-        routines = emit_lane_routines.texts(layout.site, called)
-        before = emit_lanes.wrappers("".join([*routines, *texts]))
+        routines = simd_routines.texts(layout.site, called)
+        before = simd_printer.wrappers("".join([*routines, *texts]))
         places = [layout, *([layout.at_centroid()] if layout.form.centroid else [])]
-        tables = [emit_constants.used(place, "".join(texts)) for place in places]
+        tables = [cell_constants.used(place, "".join(texts)) for place in places]
         before += [*routines, *dict.fromkeys(table for some in tables for table in some)]
-        files.append(emit_source.source(d, texts, before) if texts else "")
+        files.append(c_source.source(d, texts, before) if texts else "")
     shared = dict(pair for f in functions.values() for pair in f.shared)
     return KernelSource(d, files[0], functions, files[1], shared)
 
@@ -192,8 +193,8 @@ def _at_point(layout: Layout, task: str) -> Function:
     """One kernel of a page of fields: the function of a point and the loops of the cell."""
     chosen = _moduli(layout.site, task)
     outputs, plan, called = _ordered(layout, task, chosen)
-    made = emit_points.kernel(
-        layout, task, emit_points.At(outputs, plan), _at_centroid(layout, task, outputs)
+    made = point_kernel.kernel(
+        layout, task, point_kernel.At(outputs, plan), _at_centroid(layout, task, outputs)
     )
     shared = () if made.shared is None else (made.shared,)
     return Function(
@@ -201,17 +202,17 @@ def _at_point(layout: Layout, task: str) -> Function:
     )
 
 
-def _at_centroid(layout: Layout, task: str, point: Outputs) -> emit_points.At | None:
+def _at_centroid(layout: Layout, task: str, point: Outputs) -> point_kernel.At | None:
     """Values at the centroid that the function of a point reads, None where there are none."""
     form, needs = layout.form, Needs.of(point.entries)
-    first = at_points.first_rate(form.definition, task)
+    first = point_outputs.first_rate(form.definition, task)
     read = {*needs["dofs"], *(k - first for k in needs["direction"])}
     if not read.intersection(form.centroid):
         return None
-    way = Variant("at the centroid", at_points.at_centroid(form, task))
+    way = Variant("at the centroid", point_outputs.at_centroid(form, task))
     attempt = _attempt(layout.site, way, unrolled=True)
     outputs, plan, _ = _ordered(layout, task, attempt)
-    return emit_points.At(Outputs(outputs.entries, square=False), plan)
+    return point_kernel.At(Outputs(outputs.entries, square=False), plan)
 
 
 def _ordered(
@@ -221,7 +222,7 @@ def _ordered(
     site = layout.site
     chosen = chosen or _moduli(site, task)
     entries, plan = chosen.entries, chosen.plan
-    called = tuple(emit_routines.called([x.node for x in entries]))
+    called = tuple(c_routines.called([x.node for x in entries]))
     if is_straight(plan):
         roots, order = arranged(site.graph, [x.node for x in entries])
         entries, plan = placed(entries, roots), straight_line(order)
@@ -232,29 +233,30 @@ def _ordered(
 
 def _file(d: Definition, functions: Sequence[Function], *, single: bool) -> str:
     """The C file of some functions, with the routines that they call. single: with one lane."""
-    routines = emit_lane_routines.texts(d, dict.fromkeys(r for f in functions for r in f.routines))
+    routines = simd_routines.texts(d, dict.fromkeys(r for f in functions for r in f.routines))
     called = "".join([*routines, *(f.text for f in functions)])
-    before = emit_lanes.wrappers(called) + routines
-    return emit_source.source(d, [f.text for f in functions], before, single=single)
+    before = simd_printer.wrappers(called) + routines
+    return c_source.source(d, [f.text for f in functions], before, single=single)
 
 
 def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Function:
     """One kernel, all stages in the order of this file's first lines."""
-    forms = structure.linear_forms(d) if variants.differentiated(task) else None
-    found = None if forms is None else structure.quadratic_values(d, forms)
-    ways = [_for_target(v, task, target) for v in variants.variants(d, task, found)]
+    forms = potential_structure.linear_forms(d) if task_outputs.differentiated(task) else None
+    found = None if forms is None else potential_structure.quadratic_values(d, forms)
+    ways = [_for_target(v, task, target) for v in task_outputs.variants(d, task, found)]
     attempts = tuple(_attempts(d, task, ways))
     chosen = min(attempts, key=lambda a: a.operations)
     entries, plan = chosen.entries, chosen.plan
-    called = tuple(emit_routines.called([x.node for x in entries]))
-    printer = emit_ufcx if target is Target.UFCX else emit_simd
-    if printer is emit_simd and is_straight(plan):
+    called = tuple(c_routines.called([x.node for x in entries]))
+    self_contained = target is Target.UFCX
+    if not self_contained and is_straight(plan):
         roots, order = arranged(d.graph, [x.node for x in entries])
         entries, plan = placed(entries, roots), straight_line(order)
-    elif printer is emit_simd:
+    elif not self_contained:
         plan = arranged_plan(d.graph, plan, [x.node for x in entries])
-    text, temporaries = printer.function(d, task, entries, plan)
-    name = printer.__name__.rpartition(".")[2]
+    write = ufcx.function if self_contained else simd_kernel.function
+    text, temporaries = write(d, task, entries, plan)
+    name = "ufcx" if self_contained else "simd"
     return Function(text, plan, temporaries, found, attempts, chosen, name, called)
 
 
@@ -275,7 +277,7 @@ def _attempts(d: Definition, task: str, ways: Sequence[Variant]) -> Iterator[Att
 
 
 def _for_target(v: Variant, task: str, target: Target) -> Variant:
-    return Variant(v.rule, emit_ufcx.chosen(v.entries, task)) if target is Target.UFCX else v
+    return Variant(v.rule, ufcx.chosen(v.entries, task)) if target is Target.UFCX else v
 
 
 def _attempt(d: Definition, way: Variant, *, unrolled: bool) -> Attempt:

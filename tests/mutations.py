@@ -58,31 +58,31 @@ REFERENCE = "tests/physics/test_kernels_against_reference.py"
 FAULTS = (
     # the compiler
     Fault(
-        "codegen/graph/partials.py",
+        "codegen/graph/partial_derivatives.py",
         "g.mul(g.const(Fraction(1, 2)), g.recip(n))",
         "g.mul(g.const(Fraction(1, 3)), g.recip(n))",
         "tests/codegen/test_differentiate.py",
     ),
     Fault(
-        "codegen/graph/partials.py",
+        "codegen/graph/partial_derivatives.py",
         "(x, g.neg(g.mul(a, scale)))",
         "(x, g.mul(a, scale))",
         "tests/codegen/test_differentiate.py tests/codegen/test_tasks.py",
     ),
     Fault(
-        "codegen/graph/differentiate.py",
+        "codegen/graph/differentiation.py",
         "sides[1].get(f, zero)",
         "sides[0].get(f, zero)",
         "tests/codegen/test_differentiate.py",
     ),
     Fault(
-        "codegen/graph/divide.py",
+        "codegen/graph/divided_difference.py",
         "g.branch(there, second, otherwise)",
         "g.branch(there, otherwise, otherwise)",
         "tests/codegen/test_stretches.py",
     ),
     Fault(
-        "codegen/emit/divided.py",
+        "codegen/emit/c_routines.py",
         "g * expm1(d) / d",
         "0.5 * (f + g)",
         "tests/codegen/test_stretches.py",
@@ -100,43 +100,43 @@ FAULTS = (
         "tests/codegen/test_passes.py",
     ),
     Fault(
-        "codegen/optimise/factors.py",
+        "codegen/optimise/factoring.py",
         "(-sign if n.op is Op.SUB else sign, b)",
         "(sign, b)",
         "tests/codegen/test_passes.py",
     ),
     Fault(
-        "codegen/emit/points/tensor.py",
+        "codegen/emit/points/sum_factored_btab.py",
         "if turn[key] <= turn[mirrored[key]]",
         "if turn[key] < turn[mirrored[key]]",
         FIELDS,
     ),
     Fault(
-        "codegen/emit/points/loops.py",
+        "codegen/emit/points/point_kernel.py",
         "(-P[{k}]) * L{axis}{m}",
         "(-P[{k}]) * L{m}{axis}",
         FIELDS,
     ),
     Fault(
-        "codegen/emit/points/inputs.py",
+        "codegen/emit/points/point_inputs.py",
         'return "".join(f" - {array}',
         'return "".join(f" + {array}',
         FIELDS,
     ),
     Fault(
-        "codegen/language/side.py",
+        "codegen/language/boundary_model.py",
         "return [t[1][0], -t[0][0]]",
         "return [-t[1][0], t[0][0]]",
         "tests/runtime/test_study_fields.py",
     ),
     Fault(
-        "codegen/emit/lanes.py",
+        "codegen/emit/simd_printer.py",
         "m.op is not Op.CALL and all(",
         "m.op is not Op.CALL and any(",
         "tests/codegen/test_lanes.py",
     ),
     Fault(
-        "codegen/language/elements/shapes.py",
+        "codegen/elements/shapes.py",
         "c * (1 + a * xi) * (1 + b * eta) / 8",
         "c * (1 + a * xi) * (1 - b * eta) / 8",
         "tests/codegen/test_elements.py tests/codegen/test_dimensions.py",
@@ -185,7 +185,7 @@ FAULTS = (
         f"{ORACLE} -k conserving",
     ),
     Fault(
-        "codegen/models/support.py",
+        "codegen/models/restraints.py",
         "angle * (z**2 + r**2)",
         "angle * (z**2 - r**2)",
         f"{ORACLE} -k mean_rotation",
@@ -206,7 +206,7 @@ FAULTS = (
         "film_upwind",
     ),
     Fault(
-        "codegen/language/materials.py",
+        "codegen/language/energies.py",
         "(19, 7000)",
         "(19, 7001)",
         f"{REFERENCE} -k arruda_boyce",
@@ -245,13 +245,13 @@ FAULTS = (
         "tests/runtime/test_touching_faces.py",
     ),
     Fault(
-        "codegen/models/mortar.py",
+        "codegen/models/mortar_2d.py",
         "*(-v for v in at.M)]",
         "*(v for v in at.M)]",
         ORACLE,
     ),
     Fault(
-        "codegen/models/mortar.py",
+        "codegen/models/mortar_2d.py",
         "(stick, friction > 0), (0, True)",
         "(stick, True)",
         "tests/runtime/test_motion_constraints.py -k bodies_in_contact",
@@ -506,13 +506,13 @@ FAULTS = (
     ),
     # other programs
     Fault(
-        "codegen/hosts/material.py",
+        "codegen/hosts/material_response.py",
         'F = m.define("F", (sp.eye(3) + E) * F0)',
         'F = m.define("F", F0 * (sp.eye(3) + E))',
         "tests/codegen/hosts/test_materials.py",
     ),
     Fault(
-        "codegen/hosts/abaqus.py",
+        "codegen/hosts/abaqus_element.py",
         'return f"-(U[{i}] - du[{i}]) * {rate}" if is_rate else f"U[{i}] - du[{i}]"',
         'return f"-(U[{i}] - du[{i}]) * {rate}" if is_rate else f"U[{i}]"',
         "tests/codegen/hosts/test_abaqus_element.py",
@@ -525,13 +525,13 @@ FAULTS = (
     ),
     # what runs and what is held are what was given
     Fault(
-        "codegen/tools/neighbours.py",
+        "codegen/tools/import_record.py",
         "    for name in before:\n        del sys.modules[name]\n",
         "",
         "tests/codegen/test_neighbours.py",
     ),
     Fault(
-        "codegen/tools/cache.py",
+        "codegen/tools/cache_store.py",
         'for path, told in stored["read"].items()',
         "for path, told in ()",
         "tests/codegen/test_neighbours.py -k table",

@@ -12,7 +12,7 @@ import pytest
 
 import softehl
 from softehl import SoftehlError
-from softehl.codegen.language.complaints import ModelError
+from softehl.codegen.language.errors import ModelError
 from softehl.runtime.solve.solution import NotConverged, Solution, Status
 
 ROOT = Path(__file__).parents[1]

@@ -22,8 +22,8 @@ ALLOWED = {
 }
 ORDER = {
     "codegen": (
-        *("abi", "graph", "language", "derive", "optimise", "emit"),
-        *("pipeline", "hosts", "models", "tools"),
+        *("abi", "graph", "elements", "language", "derive", "optimise", "emit"),
+        *("verify", "pipeline", "hosts", "models", "tools"),
     ),
     "runtime": (
         *("arrays io mpi suggestions", "kernels", "mesh", "solve", "discretisation", "contact"),
@@ -129,7 +129,7 @@ def test_every_folder_has_its_place(room: str) -> None:
 @pytest.mark.parametrize(
     ("room", "path", "source"),
     [
-        ("codegen", "graph/graph.py", "from softehl.codegen.emit.simd import lines"),
+        ("codegen", "graph/graph.py", "from softehl.codegen.emit.simd_kernel import lines"),
         ("codegen", "emit/simd.py", "from softehl.codegen import pipeline"),
         ("runtime", "mesh/mesh.py", "def f():\n    import softehl.runtime.discretisation.dofmap"),
         ("runtime", "solve/newton.py", "from softehl.runtime.discretisation import dofmap"),

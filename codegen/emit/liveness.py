@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from softehl.codegen.emit.schedule import If, Loop, Schedule, Statement
+from softehl.codegen.emit.code_motion import If, Loop, Schedule, Statement
 from softehl.codegen.graph.graph import Node, Op
 
 _NEVER = frozenset({Op.CONST, Op.PI, Op.INPUT, Op.NAME})

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from softehl.codegen import abi
-from softehl.codegen.derive.outputs import Entry
-from softehl.codegen.emit.printer import Printer, number
-from softehl.codegen.emit.routines import called
-from softehl.codegen.emit.schedule import Loop, Schedule
-from softehl.codegen.emit.support_lanes import ROOTS
+from softehl.codegen.derive.output_entries import Entry
+from softehl.codegen.emit.c_printer import Printer, number
+from softehl.codegen.emit.c_routines import called
+from softehl.codegen.emit.c_runtime import ROOTS
+from softehl.codegen.emit.code_motion import Loop, Schedule
 from softehl.codegen.graph.graph import Input, Node
 from softehl.codegen.language.definition import Definition
 

@@ -22,7 +22,7 @@ from typing import Any
 
 
 class Op(StrEnum):
-    """Operations of the graph; `codegen.graph.spec` says what each may hold."""
+    """Operations of the graph; `codegen.graph.verifier` says what each may hold."""
 
     CONST = "const"
     PI = "pi"
@@ -110,7 +110,7 @@ class Routine:
         raise NotImplementedError
 
     def divided(self, between: Any, call: Node) -> list[Node]:
-        """Divided differences of all results between two states (`codegen.graph.divide`)."""
+        """Divided differences of all results between two states; see `divided_difference`."""
         raise NotImplementedError
 
 

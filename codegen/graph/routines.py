@@ -1,6 +1,6 @@
 """Routines that a graph can call: local Newton iteration, inverse matrix, function of stretches.
 
-Each is opaque to the passes and printed as a C function of its own (`codegen.emit.routines`).  Its
+Each is opaque to the passes and printed as a C function of its own (`emit.c_routines`).  Its
 derivatives are results of routines and ordinary nodes, so that they can be differentiated again.
 """
 
@@ -10,12 +10,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from softehl.codegen.graph.differentiate import gradient
-from softehl.codegen.graph.divide import Divided, exchanged
+from softehl.codegen.graph.differentiation import gradient
+from softehl.codegen.graph.divided_difference import Divided, exchanged
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, Place, Routine
-from softehl.codegen.graph.guards import guarded, plus
-from softehl.codegen.graph.partials import DifferentiationError
-from softehl.codegen.graph.traverse import reachable, substitute, written_out
+from softehl.codegen.graph.guarded_products import guarded, plus
+from softehl.codegen.graph.partial_derivatives import DifferentiationError
+from softehl.codegen.graph.traversal import reachable, substitute, written_out
 
 Matrix = list[list[Node]]
 Pairs = list[tuple[Node, Node]]

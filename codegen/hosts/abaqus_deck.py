@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from softehl.codegen.hosts import patch
+from softehl.codegen.hosts import patch_mesh
 from softehl.codegen.hosts.abaqus_host import INCREMENTS, dt_of
-from softehl.codegen.hosts.interface import Interface
-from softehl.codegen.hosts.patch import Patch
+from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.patch_mesh import Patch
 from softehl.codegen.language.definition import Argument
 
 SCALAR = 11
@@ -39,7 +39,7 @@ def deck(page: Interface, mesh: Patch, settings: Sequence[float]) -> str:
         *(_procedure(page), f"{dt!r}, {INCREMENTS * dt!r}", "*BOUNDARY"),
         *(
             f"{h.node + 1}, {numbers[h.field]}, {numbers[h.field]}, {h.value!r}"
-            for h in patch.held(page, mesh)
+            for h in patch_mesh.held(page, mesh)
         ),
         *("*NODE PRINT, NSET=ALL", "U" if page.vector else "NT"),
         *("*EL PRINT, ELSET=CELLS", "SDV", "*END STEP", ""),

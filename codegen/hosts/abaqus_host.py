@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from softehl.codegen.graph.evaluate import State
-from softehl.codegen.hosts import api, patch
-from softehl.codegen.hosts.c import DIFFERENCE, LIMIT
-from softehl.codegen.hosts.interface import Before, Given, Interface, Source, Timed
-from softehl.codegen.hosts.patch import Patch
-from softehl.codegen.hosts.sample import Sample
+from softehl.codegen.graph.evaluation import State
+from softehl.codegen.hosts import c_interface, patch_mesh
+from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
+from softehl.codegen.hosts.element_interface import Before, Given, Interface, Source, Timed
+from softehl.codegen.hosts.patch_mesh import Patch
+from softehl.codegen.hosts.test_states import Sample
 
 INCREMENTS = 4
 """Increments of the patch."""
@@ -24,7 +24,7 @@ def program(page: Interface) -> str:
         "difference": _fortran(DIFFERENCE),
         "differences": ".false." if page.definition.given else ".true.",
     }
-    return api.filled(api.template("uel_host.f90"), words)
+    return c_interface.filled(c_interface.template("uel_host.f90"), words)
 
 
 def _fortran(value: float) -> str:
@@ -111,9 +111,9 @@ def sample_file(page: Interface, found: Sequence[Sample], stored: int | None = N
 
 def patch_file(page: Interface, mesh: Patch, settings: Sequence[float]) -> str:
     """patch.txt: the mesh, equations of each cell, and what is held."""
-    number, fixed = patch.numbers(page, mesh), patch.held(page, mesh)
+    number, fixed = patch_mesh.numbers(page, mesh), patch_mesh.held(page, mesh)
     width = page.variables
-    rest = patch.starts(page)
+    rest = patch_mesh.starts(page)
     state = [dict(page.definition.example).get(a.name, 0.0) for a in page.state]
     start = ([*state * page.points] + [0.0] * width)[:width]
     of_place = {place: k for k, f in enumerate(page.nodal) for place in f.places}

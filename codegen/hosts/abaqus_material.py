@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from softehl.codegen.hosts import api
-from softehl.codegen.hosts import solid as shared
-from softehl.codegen.hosts.material import Measure, Response, checked, response
-from softehl.codegen.hosts.solid import States
+from softehl.codegen.hosts import c_interface
+from softehl.codegen.hosts import material_common as shared
+from softehl.codegen.hosts.material_common import States
+from softehl.codegen.hosts.material_response import Measure, Response, checked, response
 from softehl.codegen.language.material import Law
 
 
@@ -16,17 +16,17 @@ def umat(law: Law, states: States) -> dict[str, str]:
     """Every file of a user material."""
     r = response(law, Measure.CAUCHY)
     r = checked(r, [replace(s, data=()) for s in states(r.written)])
-    texts, _ = api.files(r.page, single=True)
+    texts, _ = c_interface.files(r.page, single=True)
     more, settings = shared.tests(r, states)
     words = {**shared.words(r, "*noel"), "moduli": _moduli(r), "deformation": _deformation(r)}
     words["density"] = "fields[0]" if r.measure is Measure.SMALL else f"fields[0] / {_VOLUME}"
-    texts["umat.c"] = api.filled(api.template("umat.c"), words)
-    texts["element.f90"] = api.filled(api.template("umat_element.f90"), words)
-    texts["Makefile"] = api.filled(
-        api.template("abaqus.mk"),
+    texts["umat.c"] = c_interface.filled(c_interface.template("umat.c"), words)
+    texts["element.f90"] = c_interface.filled(c_interface.template("umat_element.f90"), words)
+    texts["Makefile"] = c_interface.filled(
+        c_interface.template("abaqus.mk"),
         {**words, "kind": "umat", "host": "tetrahedron.f90 element.f90 host.f90"},
     )
-    texts["NOTES.md"] = api.filled(api.template("umat.md"), words)
+    texts["NOTES.md"] = c_interface.filled(c_interface.template("umat.md"), words)
     texts[f"{law.name}.inp"] = _deck(r, settings)
     return texts | more
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from softehl.codegen.hosts import api
-from softehl.codegen.hosts import solid as shared
-from softehl.codegen.hosts.material import Measure, Response, checked, packed, response
-from softehl.codegen.hosts.solid import States
+from softehl.codegen.hosts import c_interface
+from softehl.codegen.hosts import material_common as shared
+from softehl.codegen.hosts.material_common import States
+from softehl.codegen.hosts.material_response import Measure, Response, checked, packed, response
 from softehl.codegen.language.material import Law
 
 
@@ -19,14 +19,14 @@ def library(law: Law, states: States) -> dict[str, str]:
     r = checked(r, found)
     if not r.symmetric:
         r = packed(r, found)
-    texts, _ = api.files(r.page, single=True)
+    texts, _ = c_interface.files(r.page, single=True)
     more, settings = shared.tests(r, states)
     words = {**shared.words(r, "*iel"), **_names(law), "deformation": _deformation(r)}
     words["moduli"] = ", ".join(str(r.modulus(i, j)) for j in range(6) for i in range(j + 1))
-    texts["calculix.c"] = api.filled(api.template("calculix.c"), words)
-    texts["element.f90"] = api.filled(api.template("calculix_element.f90"), words)
-    texts["Makefile"] = api.filled(api.template("calculix.mk"), words)
-    texts["NOTES.md"] = api.filled(api.template("calculix.md"), words)
+    texts["calculix.c"] = c_interface.filled(c_interface.template("calculix.c"), words)
+    texts["element.f90"] = c_interface.filled(c_interface.template("calculix_element.f90"), words)
+    texts["Makefile"] = c_interface.filled(c_interface.template("calculix.mk"), words)
+    texts["NOTES.md"] = c_interface.filled(c_interface.template("calculix.md"), words)
     texts[f"{law.name}.inp"] = deck(r, settings)
     return texts | more
 

@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import json
 
-from softehl.codegen.hosts import api
-from softehl.codegen.hosts.c import DIFFERENCE, LIMIT
-from softehl.codegen.hosts.interface import Interface
-from softehl.codegen.hosts.material import VOIGT, is_small, point
-from softehl.codegen.hosts.sample import Sample, samples
-from softehl.codegen.hosts.solid import States
+from softehl.codegen.hosts import c_interface
+from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
+from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.material_common import States
+from softehl.codegen.hosts.material_response import VOIGT, is_small, point
+from softehl.codegen.hosts.test_states import Sample, samples
 from softehl.codegen.language.material import Law
 
 
 def module(law: Law, states: States) -> dict[str, str]:
     """Every file of a material for forms of DOLFINx."""
     page, small = Interface(point(law)), is_small(law)
-    texts, kernel = api.files(page)
+    texts, kernel = c_interface.files(page)
     found = samples(page, kernel, states(page.definition))
     words = _words(page, found[0], small)
-    texts[f"{law.name}_dolfinx.py"] = api.filled(api.template("dolfinx.py.in"), words)
-    texts[f"test_{law.name}.py"] = api.filled(api.template("dolfinx_test.py.in"), words)
-    texts["Makefile"] = api.filled(api.template("dolfinx.mk"), words)
-    texts["NOTES.md"] = api.filled(api.template("dolfinx.md"), words)
+    texts[f"{law.name}_dolfinx.py"] = c_interface.filled(
+        c_interface.template("dolfinx.py.in"), words
+    )
+    texts[f"test_{law.name}.py"] = c_interface.filled(
+        c_interface.template("dolfinx_test.py.in"), words
+    )
+    texts["Makefile"] = c_interface.filled(c_interface.template("dolfinx.mk"), words)
+    texts["NOTES.md"] = c_interface.filled(c_interface.template("dolfinx.md"), words)
     values = {
         "p": [float(v) for v in found[0].state.parameters],
         "states": [_state(page, s, small) for s in found],

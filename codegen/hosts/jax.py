@@ -7,33 +7,35 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from softehl.codegen.abi import Task
-from softehl.codegen.graph.evaluate import State
-from softehl.codegen.hosts import api, patch
-from softehl.codegen.hosts.c import DIFFERENCE, LIMIT
-from softehl.codegen.hosts.interface import Interface
-from softehl.codegen.hosts.sample import Sample, samples
+from softehl.codegen.graph.evaluation import State
+from softehl.codegen.hosts import c_interface, patch_mesh
+from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
+from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.test_states import Sample, samples
 
 
 def module(page: Interface, states: Sequence[State]) -> dict[str, str]:
     """Every file of a module for JAX."""
     page.require("jax", Task.RESIDUAL, Task.TANGENT)
     page = with_derivatives(page)
-    texts, kernel = api.files(page)
+    texts, kernel = c_interface.files(page)
     found = samples(page, kernel, states)
     words = _words(page, found[0])
-    texts["jax_ops.cc"] = api.filled(
-        api.template("jax.cc"), {**words, "operations": "\n".join(_operations(page))}
+    texts["jax_ops.cc"] = c_interface.filled(
+        c_interface.template("jax.cc"), {**words, "operations": "\n".join(_operations(page))}
     )
-    parts = "".join(api.template(f"jax_{t}.py.in") for t in _parts(page))
-    module = api.template("jax.py.in").replace("@functions@\n", parts)
-    texts[f"{page.name}_jax.py"] = api.filled(module, words).rstrip() + "\n"
-    texts[f"test_{page.name}.py"] = api.filled(api.template("jax_test.py.in"), words)
-    texts["equilibrium.py"] = api.filled(api.template("equilibrium.py.in"), words)
+    parts = "".join(c_interface.template(f"jax_{t}.py.in") for t in _parts(page))
+    module = c_interface.template("jax.py.in").replace("@functions@\n", parts)
+    texts[f"{page.name}_jax.py"] = c_interface.filled(module, words).rstrip() + "\n"
+    texts[f"test_{page.name}.py"] = c_interface.filled(
+        c_interface.template("jax_test.py.in"), words
+    )
+    texts["equilibrium.py"] = c_interface.filled(c_interface.template("equilibrium.py.in"), words)
     if page.cell is not None and page.nodal and not page.free:
         texts["patch.json"] = _patch_file(page)
     texts["samples.json"] = _sample_file(found)
-    texts["Makefile"] = api.filled(api.template("jax.mk"), words)
-    texts["NOTES.md"] = api.filled(api.template("jax.md"), words)
+    texts["Makefile"] = c_interface.filled(c_interface.template("jax.mk"), words)
+    texts["NOTES.md"] = c_interface.filled(c_interface.template("jax.md"), words)
     return texts
 
 
@@ -77,7 +79,7 @@ def _operations(page: Interface) -> list[str]:
 
 
 def _words(page: Interface, first: Sample) -> dict[str, object]:
-    d, sizes = page.definition, api.sizes(page)
+    d, sizes = page.definition, c_interface.sizes(page)
     has_energy = Task.ENERGY in page.tasks
     pairs = zip(d.parameters, first.state.parameters, strict=True)
     return {
@@ -123,8 +125,12 @@ def _sample_file(found: Sequence[Sample]) -> str:
 def _patch_file(page: Interface) -> str:
     """A patch of cells: places, numbers of unknowns, and what is held."""
     assert page.cell is not None
-    mesh = patch.patch(page.cell)
-    number, fixed, rest = patch.numbers(page, mesh), patch.held(page, mesh), patch.starts(page)
+    mesh = patch_mesh.patch(page.cell)
+    number, fixed, rest = (
+        patch_mesh.numbers(page, mesh),
+        patch_mesh.held(page, mesh),
+        patch_mesh.starts(page),
+    )
     dofs = [[0] * len(page.definition.unknowns) for _ in mesh.cells]
     for row, cell in zip(dofs, mesh.cells, strict=True):
         for k, f in enumerate(page.nodal):

@@ -8,13 +8,13 @@ from itertools import groupby
 from typing import Any
 
 from softehl.codegen.abi import TargetError, Task
-from softehl.codegen.graph.evaluate import State
+from softehl.codegen.elements import cells
+from softehl.codegen.elements.cells import Element
+from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import abaqus_host as host
-from softehl.codegen.hosts import api, patch
-from softehl.codegen.hosts.interface import Given, Interface
-from softehl.codegen.hosts.sample import Sample, samples
-from softehl.codegen.language.elements import cells
-from softehl.codegen.language.elements.cells import Element
+from softehl.codegen.hosts import c_interface, patch_mesh
+from softehl.codegen.hosts.element_interface import Given, Interface
+from softehl.codegen.hosts.test_states import Sample, samples
 
 KINDS = {
     "line2": ("ET_SEGM", 1), "line3": ("ET_SEGM", 2),
@@ -38,14 +38,16 @@ MESHES = {
 def module(page: Interface, states: Sequence[State]) -> dict[str, str]:
     """Every file of the integrator."""
     kind = _kind(page)
-    texts, kernel = api.files(page, single=True)
+    texts, kernel = c_interface.files(page, single=True)
     texts = _many(page) | texts
     words = _words(page, kind, samples(page, kernel, states)[0])
-    texts["ngsolve.cpp"] = api.filled(api.template("ngsolve.cpp"), words)
-    texts["form.hpp"] = api.filled(api.template("ngsolve_form.hpp"), words)
-    texts[f"test_{page.name}.py"] = api.filled(api.template("ngsolve_test.py.in"), words)
-    texts["Makefile"] = api.filled(api.template("ngsolve.mk"), words)
-    texts["NOTES.md"] = api.filled(api.template("ngsolve.md"), words)
+    texts["ngsolve.cpp"] = c_interface.filled(c_interface.template("ngsolve.cpp"), words)
+    texts["form.hpp"] = c_interface.filled(c_interface.template("ngsolve_form.hpp"), words)
+    texts[f"test_{page.name}.py"] = c_interface.filled(
+        c_interface.template("ngsolve_test.py.in"), words
+    )
+    texts["Makefile"] = c_interface.filled(c_interface.template("ngsolve.mk"), words)
+    texts["NOTES.md"] = c_interface.filled(c_interface.template("ngsolve.md"), words)
     return texts
 
 
@@ -53,7 +55,7 @@ def _many(page: Interface) -> dict[str, str]:
     """The tangent again, for many cells at a time, under another name."""
     d = page.definition
     again = Interface(replace(d, name=f"{d.name}_many", tasks=(Task.TANGENT,)))
-    return api.files(again)[0]
+    return c_interface.files(again)[0]
 
 
 def _kind(page: Interface) -> Element:
@@ -172,7 +174,7 @@ def _of_test(page: Interface, kind: Element, first: Sample) -> dict[str, Any]:
         "place_lists": [list(f.places) for f in page.nodal],
         "mirror": mirror,
         "jacobian": f"np.array([X[k] - X[0] for k in {edges}])[:, :DIM]",
-        "rest": patch.starts(page),
+        "rest": patch_mesh.starts(page),
         "size": 0.02,
         "parameter_values": [float(v) for v in first.state.parameters],
         "data_values": [float(v) for v in first.state.data],

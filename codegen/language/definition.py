@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.graph.graph import Graph, Node
-from softehl.codegen.language.elements.quadrature import QuadratureRule
-from softehl.codegen.language.record import Record
+from softehl.codegen.language.sympy_tape import Record
 
 
 @dataclass(frozen=True)

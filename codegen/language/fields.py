@@ -16,11 +16,11 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language.complaints import Elsewhere, ModelError, NeedsElement
+from softehl.codegen.elements.cells import Element
+from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.language.definition import Component
-from softehl.codegen.language.elements.cells import Element
-from softehl.codegen.language.elements.quadrature import QuadratureRule
-from softehl.codegen.language.entries import Entries, Matrix
+from softehl.codegen.language.errors import Elsewhere, ModelError, NeedsElement
+from softehl.codegen.language.flatten import Entries, Matrix
 from softehl.codegen.language.model import Model
 
 PLANE, AXISYMMETRIC, SOLID = "plane strain", "axisymmetric", "solid"

@@ -12,9 +12,9 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language.complaints import ModelError
-from softehl.codegen.language.elements import cells, shapes
-from softehl.codegen.language.entries import Listed
+from softehl.codegen.elements import cells, shapes
+from softehl.codegen.language.errors import ModelError
+from softehl.codegen.language.flatten import Listed
 from softehl.codegen.language.model import Model
 
 

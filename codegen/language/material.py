@@ -19,13 +19,13 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import PointForm
-from softehl.codegen.language.draft import NAME
-from softehl.codegen.language.entries import Matrix, applied
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.fields import AXES, Fields
+from softehl.codegen.language.flatten import Matrix, applied
 from softehl.codegen.language.model import Model
-from softehl.codegen.language.pages import Page
+from softehl.codegen.language.model_builder import NAME
+from softehl.codegen.language.weak_form import Page
 
 _SHOWN = {1: ((0, 0),), 2: ((0, 0), (1, 1), (2, 2), (0, 1))}
 _SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))

@@ -14,11 +14,11 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language import local
-from softehl.codegen.language.complaints import ModelError
+from softehl.codegen.language import local_unknowns
 from softehl.codegen.language.definition import Argument, Definition
-from softehl.codegen.language.draft import Draft
-from softehl.codegen.language.entries import Listed
+from softehl.codegen.language.errors import ModelError
+from softehl.codegen.language.flatten import Listed
+from softehl.codegen.language.model_builder import Draft
 
 __all__ = ["Argument", "Definition", "Model"]
 
@@ -397,9 +397,9 @@ class Model(Draft):
         ModelError
             The residuals have another form than `start`.
         """
-        iteration = local.Iteration(tolerance, size, iterations)
+        iteration = local_unknowns.Iteration(tolerance, size, iterations)
         condensed = partial(self._condensed, name)
-        return local.implicit(self._symbols, name, equations, start, iteration, condensed)
+        return local_unknowns.implicit(self._symbols, name, equations, start, iteration, condensed)
 
     def principal(self, name: str, C: Any, energy: Any = None) -> sp.Symbol:
         """Return an isotropic energy of the principal stretches.
@@ -425,7 +425,7 @@ class Model(Draft):
         ModelError
             C has a wrong shape, or the energy is not symmetric.
         """
-        return local.principal(self._symbols, name, C, energy)
+        return local_unknowns.principal(self._symbols, name, C, energy)
 
     def derivative(self, name: str, value: Any, by: Any) -> Any:
         """Return derivatives of a scalar, such as P = dW/dF.

@@ -5,26 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from softehl.codegen.language import materials
+from softehl.codegen.language import energies
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import (
-    boundary,
+    biaxial_sheet,
     contact,
     film,
+    follower_pressure,
     mixed_film,
-    mortar,
+    mortar_2d,
+    mortar_3d,
+    restraints,
     rheology,
-    sheet,
     solid,
-    support,
-    touch,
 )
 
 MATERIALS = {
-    "yeoh": materials.YEOH,
-    "ogden": materials.OGDEN,
-    "arruda_boyce": materials.ARRUDA_BOYCE,
-    "gent": materials.GENT,
+    "yeoh": energies.YEOH,
+    "ogden": energies.OGDEN,
+    "arruda_boyce": energies.ARRUDA_BOYCE,
+    "gent": energies.GENT,
 }
 """Energies beside the paper's; of the elements the Taylor-expanded one, the default, has them.
 
@@ -37,8 +37,8 @@ THINNING = {"eyring": rheology.eyring, "carreau": rheology.carreau}
 _SMOOTH = {"film": film.reynolds_segment, "film_conserving": mixed_film.conserving_segment}
 
 
-def _of(name: str, energy: materials.Energy) -> Callable[[], Definition]:
-    return partial(solid.taylor_mean, name, (energy, materials.VOLUMETRIC), unroll=False)
+def _of(name: str, energy: energies.Energy) -> Callable[[], Definition]:
+    return partial(solid.taylor_mean, name, (energy, energies.VOLUMETRIC), unroll=False)
 
 
 ALL: dict[str, Callable[[], Definition]] = {
@@ -47,14 +47,14 @@ ALL: dict[str, Callable[[], Definition]] = {
     "solid_taylor": solid.taylor,
     "solid_taylor_mean": solid.taylor_mean,
     **{(name := f"solid_taylor_mean_{m}"): _of(name, energy) for m, energy in MATERIALS.items()},
-    "follower_pressure": boundary.follower_pressure,
+    "follower_pressure": follower_pressure.follower_pressure,
     "contact": contact.augmented_lagrangian,
     "contact_friction": contact.coulomb,
     "contact_corner": contact.corner,
-    **{f"mortar_{a}{b}": partial(mortar.pair, a, b) for a in (2, 3) for b in (2, 3)},
-    **{f"mortar_side_{a}": partial(mortar.side, a) for a in (2, 3)},
-    "touch": touch.touch,
-    **{f"touch_side_{a}": partial(touch.face, a) for a in (3, 4, 6, 8, 9)},
+    **{f"mortar_{a}{b}": partial(mortar_2d.pair, a, b) for a in (2, 3) for b in (2, 3)},
+    **{f"mortar_side_{a}": partial(mortar_2d.side, a) for a in (2, 3)},
+    "touch": mortar_3d.touch,
+    **{f"touch_side_{a}": partial(mortar_3d.face, a) for a in (3, 4, 6, 8, 9)},
     "film": film.reynolds_segment,
     "film_upwind": film.bubble_load,
     "film_facet": film.reynolds_facet,
@@ -69,11 +69,11 @@ ALL: dict[str, Callable[[], Definition]] = {
     },
     "film_squeeze": mixed_film.squeeze,
     "film_squeeze_rough": mixed_film.rough_squeeze,
-    "mean_rotation": support.mean_rotation,
-    "mean_axial": support.mean_axial,
-    "axial_spring": support.axial_spring,
+    "mean_rotation": restraints.mean_rotation,
+    "mean_axial": restraints.mean_axial,
+    "axial_spring": restraints.axial_spring,
     **{
-        (name := f"sheet_{m}"): partial(sheet.sheet, name, energy)
-        for m, energy in {"mooney_rivlin": materials.MOONEY_RIVLIN, **MATERIALS}.items()
+        (name := f"sheet_{m}"): partial(biaxial_sheet.sheet, name, energy)
+        for m, energy in {"mooney_rivlin": energies.MOONEY_RIVLIN, **MATERIALS}.items()
     },
 }

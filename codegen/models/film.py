@@ -13,8 +13,8 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.elements import quadrature, shapes
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import rheology
 

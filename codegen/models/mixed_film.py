@@ -16,9 +16,9 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.elements import quadrature, shapes
+from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature, shapes
-from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import rheology, roughness
 from softehl.codegen.models.film import (

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import sympy as sp
 
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.elements import quadrature
 from softehl.codegen.language.model import Model
 
 Flow: TypeAlias = Callable[..., tuple[Any, Any]]

@@ -9,15 +9,15 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.elements import quadrature, shapes
+from softehl.codegen.language import energies
 from softehl.codegen.language import kinematics as kin
-from softehl.codegen.language import materials
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
 
-Terms = tuple[materials.Energy, materials.Energy]
+Terms = tuple[energies.Energy, energies.Energy]
 """Isochoric and volumetric term of an energy."""
-PAPER = (materials.MOONEY_RIVLIN, materials.VOLUMETRIC)
+PAPER = (energies.MOONEY_RIVLIN, energies.VOLUMETRIC)
 
 
 def _element(name: str, doc: str, terms: Terms, unroll: bool = True) -> tuple[Model, Any, Any, Any]:
@@ -36,7 +36,7 @@ def _energy(m: Model, label: str, F: kin.Gradient, material: Any) -> Any:
     return _isochoric(m, label, F, isochoric, bars) + volumetric(I3)
 
 
-def _isochoric(m: Model, label: str, F: kin.Gradient, term: materials.Term, bars: Any) -> Any:
+def _isochoric(m: Model, label: str, F: kin.Gradient, term: energies.Term, bars: Any) -> Any:
     """The isochoric term; bars: I1bar and I2bar."""
     if term.of == "invariants":
         return term(*bars)

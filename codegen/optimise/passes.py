@@ -13,9 +13,9 @@ from fractions import Fraction
 
 import mpmath
 
-from softehl.codegen.graph.arithmetic import number
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op
-from softehl.codegen.graph.traverse import (
+from softehl.codegen.graph.precise_arithmetic import number
+from softehl.codegen.graph.traversal import (
     Recursion,
     always,
     operations,
@@ -24,9 +24,9 @@ from softehl.codegen.graph.traverse import (
     rewrite,
     written_out,
 )
-from softehl.codegen.optimise.factors import chain, factor, product, uses
-from softehl.codegen.optimise.identity import merge_equal
-from softehl.codegen.optimise.sums import common_sums
+from softehl.codegen.optimise.common_sums import common_sums
+from softehl.codegen.optimise.factoring import chain, factor, product, uses
+from softehl.codegen.optimise.value_numbering import merge_equal
 
 Roots = list[Node]
 

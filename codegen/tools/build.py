@@ -5,7 +5,7 @@ and its SHA-256 stands beside it, so that a damaged one is never loaded.  Both a
 temporary names and moved into place: two builds at once do no harm.
 
 `python -m softehl.codegen.tools.build` compiles the kernels that ship, for the processor of this
-machine, into the user's cache (`codegen.tools.shipped`) and prints where they are.
+machine, into the user's cache (`codegen.tools.shipped_kernels`) and prints where they are.
 """
 
 from __future__ import annotations
@@ -24,10 +24,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from time import perf_counter
 
-from softehl.codegen.abi import VERSION
-from softehl.codegen.emit import support
-from softehl.codegen.tools import cache
-from softehl.errors import SoftehlError
+from softehl.codegen.abi import VERSION, BuildError, NoCompilerError
+from softehl.codegen.emit import c_runtime
+from softehl.codegen.tools import cache_store
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 COMMON = (
@@ -61,14 +60,6 @@ SHARED = "pairs_"
 _OBJECT, _SUM = "shared.o", "shared.o.sha256"
 LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
 DIGEST = f"{LIBRARY}.sha256"
-
-
-class BuildError(SoftehlError, RuntimeError):
-    """The compiler failed; the message holds what is wrong, its command line and its words."""
-
-
-class NoCompilerError(BuildError):
-    """There is no C compiler: $CC is not set, and there is no cc on the PATH."""
 
 
 def signature(directory: Path) -> str:
@@ -144,8 +135,8 @@ def build(
         linked = Path(scratch) / LIBRARY
         _run([*command, *extra, *map(str, objects), "-o", str(linked), "-lm"], linked)
         data = linked.read_bytes()
-    cache.write(directory / LIBRARY, data, mode=0o755)
-    cache.write(directory / DIGEST, f"{_sha256(data)}  {LIBRARY}\n".encode(), mode=0o644)
+    cache_store.write(directory / LIBRARY, data, mode=0o755)
+    cache_store.write(directory / DIGEST, f"{_sha256(data)}  {LIBRARY}\n".encode(), mode=0o644)
     return {source.stem: s for source, s in zip(sources, seconds, strict=True)}
 
 
@@ -160,8 +151,8 @@ def _shared(source: Path, text: str, command: Sequence[str], flags: Sequence[str
 
     It knows of the header only what is the same in all of them.
     """
-    told = (text, support.TEXT, str(VERSION), shlex.join(command), identification(flags))
-    key = cache.digest("shared", *told)
+    told = (text, c_runtime.TEXT, str(VERSION), shlex.join(command), identification(flags))
+    key = cache_store.digest("shared", *told)
 
     def complete(folder: Path) -> bool:
         data = (folder / _OBJECT).read_bytes()
@@ -170,9 +161,9 @@ def _shared(source: Path, text: str, command: Sequence[str], flags: Sequence[str
     def make(folder: Path) -> None:
         to = folder / _OBJECT
         _run([*command, "-c", str(source), "-o", str(to)], to)
-        cache.write(folder / _SUM, _sha256(to.read_bytes()).encode())
+        cache_store.write(folder / _SUM, _sha256(to.read_bytes()).encode())
 
-    return cache.folder(key, complete, make) / _OBJECT
+    return cache_store.folder(key, complete, make) / _OBJECT
 
 
 def tuned() -> tuple[tuple[str, ...], str]:
@@ -239,6 +230,6 @@ def _sha256(data: bytes) -> str:
 
 
 if __name__ == "__main__":
-    from softehl.codegen.tools.shipped import main
+    from softehl.codegen.tools.shipped_kernels import main
 
     sys.exit(main())

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from softehl.codegen import pipeline
-from softehl.codegen.abi import Target
-from softehl.codegen.hosts.all import HOSTS
+from softehl.codegen.abi import BuildError, Target
+from softehl.codegen.hosts.registry import HOSTS
 from softehl.codegen.language.material import Law
-from softehl.codegen.language.pages import On
+from softehl.codegen.language.weak_form import On
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import cache, hosts, product, targets, user
-from softehl.codegen.tools import files as cli_files
-from softehl.codegen.tools.build import GENERATED, BuildError
-from softehl.codegen.tools.location import CacheError
+from softehl.codegen.tools import cache_store, host_files, model_loader, output_files, target_files
+from softehl.codegen.tools import user_kernels as cli_files
+from softehl.codegen.tools.build import GENERATED
+from softehl.codegen.tools.cache_dir import CacheError
 from softehl.codegen.tools.model_text import ModelFileError
-from softehl.codegen.tools.samples import NoStateError
 from softehl.codegen.tools.trace import show as show_trace
-from softehl.codegen.tools.verify import SECONDS
+from softehl.codegen.verify.random_states import NoStateError
+from softehl.codegen.verify.verification import SECONDS
 
 CHECKOUT = (GENERATED.parent / "pyproject.toml").exists()
 """Whether this is a source checkout: what is installed is never written to."""
@@ -63,7 +63,7 @@ def generate(
         if target in HOSTS and (target != Target.UFCX or _materials(models, On(*on))):
             if check or trace is not None:
                 return _refused(f"--check and --trace know target simd, not {target}")
-            return hosts.generate(models, target, out, On(*on))
+            return host_files.generate(models, target, out, On(*on))
         return _generate(models, check, trace, Target(target), out, seconds, On(*on))
     except (ModelFileError, NoStateError, BuildError, CacheError) as error:
         return _refused(str(error))
@@ -73,7 +73,7 @@ def generate(
 
 def _materials(models: Sequence[Path], on: On) -> bool:
     """True for files of materials alone: target ufcx writes them otherwise than elements."""
-    found = [] if on.cells else [d for path in models for d in user.pages(path, on)]
+    found = [] if on.cells else [d for path in models for d in model_loader.pages(path, on)]
     return bool(found) and all(isinstance(d, Law) for d in found)
 
 
@@ -101,7 +101,7 @@ def _generate(
 ) -> int:
     """Regenerate `generated/`; with `check` write nothing and name what is stale (exit code 1).
 
-    With `models` do the same for the files of a user, as `codegen.tools.files` says.
+    With `models` do the same for the files of a user, as `codegen.tools.user_kernels` says.
     Another `target` than simd is only written, into the folder `out`.
     """
     if target != Target.SIMD:
@@ -109,7 +109,7 @@ def _generate(
             return _refused(f"--check and --trace know target simd, not {target}")
         if models:
             return cli_files.write_target(models, target, out, on)
-        return targets.write((make() for make in ALL.values()), target, out)
+        return target_files.write((make() for make in ALL.values()), target, out)
     if models:
         return cli_files.generate(models, out=out, check=check, trace=trace, seconds=seconds, on=on)
     if out is not None:
@@ -122,7 +122,7 @@ def _generate(
 
 
 def _regenerate(check: bool) -> int:
-    files = product.files(pipeline.compile_model(make()) for make in ALL.values())
+    files = output_files.files(pipeline.compile_model(make()) for make in ALL.values())
     stale = [name for name, text in files.items() if _differs(GENERATED / name, text)]
     known = {*files, "__init__.py"}
     strange = [p.name for p in GENERATED.glob("*.[chj]*") if p.name not in known]
@@ -136,7 +136,7 @@ def _regenerate(check: bool) -> int:
     for name in strange:
         (GENERATED / name).unlink()
     for name in stale:
-        cache.write(GENERATED / name, files[name].encode())
+        cache_store.write(GENERATED / name, files[name].encode())
     print(f"{len(files)} files in generated/, {len(stale)} of them new or changed")
     return 0
 

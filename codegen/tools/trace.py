@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.table import Table
 
 from softehl.codegen import pipeline
-from softehl.codegen.derive.structure import Structure
-from softehl.codegen.derive.variants import tasks
+from softehl.codegen.derive.potential_structure import Structure
+from softehl.codegen.derive.task_outputs import tasks
 from softehl.codegen.emit.liveness import peak_live
-from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.pipeline import Function
 

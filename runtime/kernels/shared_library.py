@@ -111,7 +111,7 @@ class Library:
         return call
 
     def action(self, kernel: str) -> Action:
-        """The C function of products by sum factorisation; see `codegen.emit.points.factored`."""
+        """The C function of products by sum factorisation (`sum_factored_product`)."""
         name = f"softehl_{kernel}_action"
         _declare(name, _ACTION)
         function = getattr(self.loaded, name)

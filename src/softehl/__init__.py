@@ -31,21 +31,21 @@ if TYPE_CHECKING:
     )
     from softehl.cases.shipped import solve_cases
     from softehl.codegen.abi import TargetError
-    from softehl.codegen.graph.partials import DifferentiationError
+    from softehl.codegen.elements import quadrature, shapes
+    from softehl.codegen.elements.cells import Element, element
+    from softehl.codegen.elements.quadrature import QuadratureRule
+    from softehl.codegen.graph.partial_derivatives import DifferentiationError
     from softehl.codegen.language import kinematics
-    from softehl.codegen.language.complaints import ModelError, ModelWarning
     from softehl.codegen.language.definition import Definition
-    from softehl.codegen.language.elements import quadrature, shapes
-    from softehl.codegen.language.elements.cells import Element, element
-    from softehl.codegen.language.elements.quadrature import QuadratureRule
+    from softehl.codegen.language.errors import ModelError, ModelWarning
     from softehl.codegen.language.fields import Fields
     from softehl.codegen.language.material import Law, Material, material
     from softehl.codegen.language.model import Model
-    from softehl.codegen.language.pages import Page, page
+    from softehl.codegen.language.weak_form import Page, page
     from softehl.codegen.tools.build import BuildError
-    from softehl.codegen.tools.location import CacheError
+    from softehl.codegen.tools.cache_dir import CacheError
     from softehl.codegen.tools.model_text import ModelFileError
-    from softehl.codegen.tools.samples import NoStateError
+    from softehl.codegen.verify.random_states import NoStateError
     from softehl.runtime.analyses.bifurcation import Bifurcation, MissedBifurcations
     from softehl.runtime.analyses.buckling import Buckling
     from softehl.runtime.analyses.callbacks import Series
@@ -158,27 +158,27 @@ _PUBLIC = {
 }
 _MODELLING = {
     "BuildError": "softehl.codegen.tools.build",
-    "CacheError": "softehl.codegen.tools.location",
+    "CacheError": "softehl.codegen.tools.cache_dir",
     "Definition": "softehl.codegen.language.definition",
-    "DifferentiationError": "softehl.codegen.graph.partials",
-    "Element": "softehl.codegen.language.elements.cells",
+    "DifferentiationError": "softehl.codegen.graph.partial_derivatives",
+    "Element": "softehl.codegen.elements.cells",
     "Fields": "softehl.codegen.language.fields",
     "Law": "softehl.codegen.language.material",
     "Material": "softehl.codegen.language.material",
     "Model": "softehl.codegen.language.model",
-    "ModelError": "softehl.codegen.language.complaints",
+    "ModelError": "softehl.codegen.language.errors",
     "ModelFileError": "softehl.codegen.tools.model_text",
-    "ModelWarning": "softehl.codegen.language.complaints",
-    "NoStateError": "softehl.codegen.tools.samples",
-    "Page": "softehl.codegen.language.pages",
-    "QuadratureRule": "softehl.codegen.language.elements.quadrature",
+    "ModelWarning": "softehl.codegen.language.errors",
+    "NoStateError": "softehl.codegen.verify.random_states",
+    "Page": "softehl.codegen.language.weak_form",
+    "QuadratureRule": "softehl.codegen.elements.quadrature",
     "TargetError": "softehl.codegen.abi",
-    "element": "softehl.codegen.language.elements.cells",
+    "element": "softehl.codegen.elements.cells",
     "kinematics": "softehl.codegen.language.kinematics:",
     "material": "softehl.codegen.language.material",
-    "page": "softehl.codegen.language.pages",
-    "quadrature": "softehl.codegen.language.elements.quadrature:",
-    "shapes": "softehl.codegen.language.elements.shapes:",
+    "page": "softehl.codegen.language.weak_form",
+    "quadrature": "softehl.codegen.elements.quadrature:",
+    "shapes": "softehl.codegen.elements.shapes:",
 }
 """What a model page needs; these import SymPy."""
 
@@ -358,7 +358,7 @@ def load_kernel(
     if isinstance(source, str) and not source.endswith(".py") and not folder_given:
         if materials:
             with with_sympy():
-                from softehl.codegen.tools.library import of_law
+                from softehl.codegen.tools.kernel_cache import of_law
 
                 return kernel.kernel_in(of_law(source, where, derivatives=derivatives), None, cell)
         shipped = kernel.load_kernel(source)
@@ -370,9 +370,9 @@ def load_kernel(
             return load_kernel(ALL[source](), derivatives=True)
     if isinstance(source, (str, Path)) and folder_given:
         return kernel.kernel_in(Path(source).resolve(), name, cell)
-    from softehl.codegen.tools import library
+    from softehl.codegen.tools import kernel_cache
 
     place = Path(source) if isinstance(source, str) else source
     with with_sympy():
-        folder = library.folder_of(place, where, derivatives=derivatives)
+        folder = kernel_cache.folder_of(place, where, derivatives=derivatives)
     return kernel.kernel_in(folder, name, cell)

@@ -165,7 +165,7 @@ def _commands() -> "click.Group":
     def kernels() -> int:
         """Show what the kernels cost, and which compiled library of them is used."""
         from softehl.cases.harness.errors import BadInput
-        from softehl.codegen.tools.table import kernels
+        from softehl.codegen.tools.cost_table import kernels
         from softehl.runtime.kernels.shared_library import KernelError, library_of
 
         try:

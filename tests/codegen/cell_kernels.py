@@ -14,7 +14,7 @@ import numpy as np
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, function_name
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.tools import build, product
+from softehl.codegen.tools import build, output_files
 from softehl.runtime.arrays import Array, Integers
 
 STRICT = ("-Wall", "-Wextra", "-Werror", "-Wpedantic", "-Wmissing-prototypes")
@@ -48,7 +48,7 @@ class CellKernels:
 def cell_kernels(d: Definition, directory: Path, flags: Sequence[str] = ("-O1",)) -> CellKernels:
     """Compile the one file of target `ufcx`, alone, without a warning."""
     source = directory / f"{d.name}_ufcx.c"
-    files = product.ufcx_files([pipeline.compile_model(d, Target.UFCX)])
+    files = output_files.ufcx_files([pipeline.compile_model(d, Target.UFCX)])
     source.write_text(files[source.name], encoding="utf-8")
     library = source.with_suffix(".so")
     command = [*build.compiler(), *build.FLAGS, *STRICT, *flags, str(source), "-o", str(library)]

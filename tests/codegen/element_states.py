@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl.codegen.graph.evaluate import State
+from softehl.codegen.graph.evaluation import State
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.quadrature import Kind, facet_rule, film_rule
 from softehl.runtime.kernels.kernel import Kernel, Rule, load_kernel

@@ -15,8 +15,8 @@ from typing import Any
 import mpmath
 import sympy as sp
 
+from softehl.codegen.elements import quadrature
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 
 Tree = tuple[Any, ...]

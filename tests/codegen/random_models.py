@@ -15,8 +15,8 @@ import mpmath
 import sympy as sp
 from hypothesis import strategies as st
 
+from softehl.codegen.elements import quadrature
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 
 DIGITS = 50

@@ -20,7 +20,7 @@ import sympy as sp
 
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.fields import Fields
-from softehl.codegen.language.pages import Form, Page
+from softehl.codegen.language.weak_form import Form, Page
 from softehl.runtime.mesh.cells import CELLS
 from tests.codegen.nested_models import DIGITS, STEP, NoValueError, Tree, drawn, value, written
 

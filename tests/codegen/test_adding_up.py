@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softehl.codegen.language.complaints import ModelError
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.elements import quadrature
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
 from tests.codegen.workshop import compiled
 

@@ -17,10 +17,10 @@ import sympy as sp
 from softehl import Mesh, Study, page
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.elements import quadrature
 from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import build, product
+from softehl.codegen.tools import build, output_files
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
 Q = sp.Rational
@@ -118,7 +118,7 @@ def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     models += [of_power(k, f) for k, (f, _) in POWERS.items()]
     models += [of_nested(k, f) for k, (f, _) in NESTED.items()]
     made = [pipeline.compile_model(m.finish(), Target.SIMD) for m in models]
-    for name, text in product.files(made).items():
+    for name, text in output_files.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
     build.build(folder, extra=(*build.STRICT, "-O1"))
     return folder

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import pytest
 
 from softehl.codegen import pipeline
+from softehl.codegen.emit.code_motion import Schedule, schedule
 from softehl.codegen.emit.liveness import peak_live
-from softehl.codegen.emit.schedule import Schedule, schedule
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import build, product
+from softehl.codegen.tools import build, output_files
 from tests.codegen.budget import LARGEST_FILE, REMEDY, excess, published, shipped
 from tests.codegen.workshop import unknowns
 
@@ -113,7 +113,7 @@ def test_sums_and_what_every_turn_reads_live_through_a_loop() -> None:
 @pytest.mark.parametrize("name", ["axial_spring", "solid_q4"])
 def test_the_manifest_counts_as_intervals_do(name: str) -> None:
     kernel = pipeline.compile_model(ALL[name]())
-    manifest = json.loads(product.files([kernel])["manifest.json"])["kernels"][name]["tasks"]
+    manifest = json.loads(output_files.files([kernel])["manifest.json"])["kernels"][name]["tasks"]
     for task in ("energy", "residual", "tangent"):
         plan = kernel.functions[task].plan
         assert manifest[task]["peak_live"] == peak_live(plan) == intervals(plan) > 8

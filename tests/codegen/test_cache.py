@@ -16,8 +16,8 @@ import pytest
 
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.fields import Fields
-from softehl.codegen.language.pages import Page
-from softehl.codegen.tools import build, cache, library, location
+from softehl.codegen.language.weak_form import Page
+from softehl.codegen.tools import build, cache_dir, cache_store, kernel_cache
 from softehl.codegen.tools.build import LIBRARY
 
 ROOT = Path(__file__).parents[2]
@@ -134,7 +134,7 @@ def test_a_killed_process_leaves_no_lock_and_no_half_file(place: Path) -> None:
     assert finished(loading(place, CC=slow)) == AGAIN
     assert rest.exists()  # it might belong to a process that is alive
     os.utime(rest, (0, 0))
-    with cache._scratch(rest.parent):
+    with cache_store._scratch(rest.parent):
         assert not rest.exists()
     assert left(place) == []
 
@@ -142,22 +142,22 @@ def test_a_killed_process_leaves_no_lock_and_no_half_file(place: Path) -> None:
 def test_the_key_of_a_library_holds_all_that_it_is_built_from(
     place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folders = [library.folder_of(Path("spring.py"))]
-    assert library.folder_of(Path("spring.py")) == folders[0]
+    folders = [kernel_cache.folder_of(Path("spring.py"))]
+    assert kernel_cache.folder_of(Path("spring.py")) == folders[0]
     (place / "spring.py").write_text(MODEL.replace("u**2", "u**4"))
-    folders.append(library.folder_of(Path("spring.py")))
+    folders.append(kernel_cache.folder_of(Path("spring.py")))
     monkeypatch.setattr("softehl.codegen.abi.VERSION", 999)
-    folders.append(library.folder_of(Path("spring.py")))
+    folders.append(kernel_cache.folder_of(Path("spring.py")))
     monkeypatch.setattr(build, "FLAGS", (*build.FLAGS, "-DNOTHING"))
-    folders.append(library.folder_of(Path("spring.py")))
+    folders.append(kernel_cache.folder_of(Path("spring.py")))
     monkeypatch.setenv("CC", str(slow_compiler(place, 0.0)))
-    folders.append(library.folder_of(Path("spring.py")))
+    folders.append(kernel_cache.folder_of(Path("spring.py")))
     assert len(set(folders)) == len(folders)
 
 
 @pytest.mark.parametrize("damage", ["edited", "library gone", "source gone", "emptied"])
 def test_what_is_damaged_is_built_anew(damage: str) -> None:
-    folder = library.folder_of(Path("spring.py"))
+    folder = kernel_cache.folder_of(Path("spring.py"))
     original = {p.name: p.read_bytes() for p in folder.iterdir() if p.name != LIBRARY}
     if damage == "edited":
         (folder / "spring.c").write_text("int edited;\n")
@@ -168,24 +168,24 @@ def test_what_is_damaged_is_built_anew(damage: str) -> None:
     else:
         for path in folder.iterdir():
             path.write_bytes(b"")
-    assert library.folder_of(Path("spring.py")) == folder
+    assert kernel_cache.folder_of(Path("spring.py")) == folder
     assert {p.name: p.read_bytes() for p in folder.iterdir() if p.name != LIBRARY} == original
     assert (folder / LIBRARY).stat().st_size > 1000
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"files": {}}', '{"content": "0", "files": {}}'])
 def test_a_damaged_record_of_derived_files_is_not_believed(place: Path, text: str) -> None:
-    cache.remember("key", {"a.c": "int a;\n"})
-    assert cache.recall("key") == {"a.c": "int a;\n"}
+    cache_store.remember("key", {"a.c": "int a;\n"})
+    assert cache_store.recall("key") == {"a.c": "int a;\n"}
     (place / "cache" / "derived" / "key.json").write_text(text)
-    assert cache.recall("key") is None
+    assert cache_store.recall("key") is None
 
 
 @pytest.fixture
 def no_fallback() -> Iterator[None]:
-    location._fallback.cache_clear()
+    cache_dir._fallback.cache_clear()
     yield
-    location._fallback.cache_clear()
+    cache_dir._fallback.cache_clear()
 
 
 @pytest.mark.usefixtures("no_fallback")
@@ -195,10 +195,10 @@ def test_a_cache_that_cannot_be_written_is_replaced_with_one_warning(
     (place / "file").write_text("not a folder")
     monkeypatch.setenv("SOFTEHL_CACHE", str(place / "file" / "cache"))
     with pytest.warns(RuntimeWarning, match=r"file/cache cannot be written .*set SOFTEHL_CACHE"):
-        first = library.folder_of(Path("spring.py"))
+        first = kernel_cache.folder_of(Path("spring.py"))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert library.folder_of(Path("spring.py")) == first
+        assert kernel_cache.folder_of(Path("spring.py")) == first
     assert (first / LIBRARY).is_file()
     assert not first.is_relative_to(place)
 
@@ -206,43 +206,43 @@ def test_a_cache_that_cannot_be_written_is_replaced_with_one_warning(
 @pytest.mark.usefixtures("no_fallback")
 @pytest.mark.parametrize("inside", ["", "derived"])
 def test_a_cache_that_others_may_write_to_is_not_used(place: Path, inside: str) -> None:
-    usual = library.folder_of(Path("spring.py"))
+    usual = kernel_cache.folder_of(Path("spring.py"))
     (place / "cache" / inside).chmod(0o777)
     if inside:  # its records are not believed, and nothing is added
-        assert cache.recall(next((place / "cache" / inside).iterdir()).stem) is None
-        with pytest.raises(location.CacheError, match=r"cache/derived is not used: others may"):
-            library.folder_of(Path("spring.py"))
+        assert cache_store.recall(next((place / "cache" / inside).iterdir()).stem) is None
+        with pytest.raises(cache_dir.CacheError, match=r"cache/derived is not used: others may"):
+            kernel_cache.folder_of(Path("spring.py"))
     else:
         with pytest.warns(RuntimeWarning, match=r"cache is not used: others may .*chmod -R go-w"):
-            found = library.folder_of(Path("spring.py"))
+            found = kernel_cache.folder_of(Path("spring.py"))
         assert not found.is_relative_to(place)
     (place / "cache" / inside).chmod(0o755)
-    assert library.folder_of(Path("spring.py")) == usual
+    assert kernel_cache.folder_of(Path("spring.py")) == usual
 
 
 def test_a_cache_of_somebody_else_is_not_used(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    library.folder_of(Path("spring.py"))
+    kernel_cache.folder_of(Path("spring.py"))
     owner = os.geteuid()
     monkeypatch.setattr(os, "geteuid", lambda: owner + 1)
-    with pytest.raises(location.CacheError, match=f"belongs to another user, number {owner}; set"):
-        location.writable()
+    with pytest.raises(cache_dir.CacheError, match=f"belongs to another user, number {owner}; set"):
+        cache_dir.writable()
 
 
 def test_the_place_of_the_cache(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert location.wanted() == place / "cache"
+    assert cache_dir.wanted() == place / "cache"
     monkeypatch.delenv("SOFTEHL_CACHE")
     monkeypatch.setenv("HOME", str(place))
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setenv("XDG_CACHE_HOME", str(place / "xdg"))
-    assert location.wanted() == place / "xdg" / "softehl"
+    assert cache_dir.wanted() == place / "xdg" / "softehl"
     monkeypatch.delenv("XDG_CACHE_HOME")
-    assert location.wanted() == place / ".cache" / "softehl"
+    assert cache_dir.wanted() == place / ".cache" / "softehl"
     monkeypatch.setattr(sys, "platform", "darwin")
-    assert location.wanted() == place / "Library" / "Caches" / "softehl"
+    assert cache_dir.wanted() == place / "Library" / "Caches" / "softehl"
 
 
 def test_files_have_the_usual_permissions(place: Path) -> None:
-    folder = library.folder_of(Path("spring.py"))
+    folder = kernel_cache.folder_of(Path("spring.py"))
     (place / "plain").write_text("")
     usual = stat.S_IMODE((place / "plain").stat().st_mode)
     records = list((place / "cache" / "derived").iterdir())
@@ -270,11 +270,11 @@ def test_what_pages_of_fields_share_is_compiled_once_and_again_where_it_is_damag
         return Page(name, write, form="point").definition("quad4")
 
     monkeypatch.setattr(build, "_run", noted)
-    library.library([page("T")])
-    library.library([page("c")])
+    kernel_cache.library([page("T")])
+    kernel_cache.library([page("c")])
     once = [name for name in compiled if name.endswith(".c")]
     assert len(once) == 1
     (stored,) = (place / "cache" / "built").glob(f"*/{build._OBJECT}")
     stored.write_bytes(b"nothing")
-    library.library([page("p")])
+    kernel_cache.library([page("p")])
     assert [name for name in compiled if name.endswith(".c")] == 2 * once

@@ -12,20 +12,20 @@ import sympy as sp
 
 import softehl
 from softehl.codegen import pipeline
+from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.traverse import reachable, rewrite
+from softehl.codegen.graph.traversal import reachable, rewrite
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
 from softehl.codegen.optimise import passes
-from softehl.codegen.tools import library, product, samples, verify
+from softehl.codegen.tools import kernel_cache, output_files
 from softehl.codegen.tools.build import LIBRARY
-from softehl.codegen.tools.derivatives import Page
-from softehl.codegen.tools.digits import Exact
-from softehl.codegen.tools.exact import Evaluator
-from softehl.codegen.tools.oracle import Oracle
-from softehl.codegen.tools.written import program
+from softehl.codegen.verify import random_states, verification
+from softehl.codegen.verify.arithmetics import Exact
+from softehl.codegen.verify.graph_oracle import Oracle
+from softehl.codegen.verify.reference_evaluator import Evaluator, Page
+from softehl.codegen.verify.sympy_program import program
 
 Rule = Callable[[Graph, Node, tuple[Node, ...]], Node]
 TASKS = ("energy", "residual", "tangent")
@@ -38,14 +38,16 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def check(d: Definition, tasks: tuple[str, ...] = TASKS, seconds: float = 10) -> verify.Report:
+def check(
+    d: Definition, tasks: tuple[str, ...] = TASKS, seconds: float = 10
+) -> verification.Report:
     """The check of kernels that are derived now, past the memory of earlier ones."""
-    folder, _ = library.compiled(product.files([pipeline.compile_model(d)]))
-    return verify.check(d, tasks, folder / LIBRARY, seconds=seconds)
+    folder, _ = kernel_cache.compiled(output_files.files([pipeline.compile_model(d)]))
+    return verification.check(d, tasks, folder / LIBRARY, seconds=seconds)
 
 
-def seen(report: verify.Report) -> bool:
-    return any(e > verify.BOUND for e in report.errors.values())
+def seen(report: verification.Report) -> bool:
+    return any(e > verification.BOUND for e in report.errors.values())
 
 
 def one(energy: Callable[..., Any], *, unroll: bool = True) -> Definition:
@@ -173,7 +175,7 @@ def test_a_right_page_passes(value: Any, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_page_and_graph_say_the_same(family: str) -> None:
     """Two evaluations in 90 digits that share no code: of the expressions, and of the graph."""
     d = ALL[family]()
-    (state,) = samples.admissible(d, 1)
+    (state,) = random_states.admissible(d, 1)
     along = [[1.0 + k / 7 for k in range(len(state.dofs))]]
     page, oracle = Page(Evaluator(program(d), Exact()), state), Oracle(d)
     pairs = [
@@ -200,9 +202,9 @@ def test_both_sides_of_a_condition_are_reached_and_what_is_not_is_said() -> None
 
 def test_the_check_ends_in_time_and_says_so() -> None:
     d = one(energy)
-    folder = library.library([d]).folder
+    folder = kernel_cache.library([d]).folder
     start = process_time()
-    report = verify.check(d, TASKS, folder / LIBRARY, seconds=0.03)
+    report = verification.check(d, TASKS, folder / LIBRARY, seconds=0.03)
     assert process_time() - start < 1
     assert report.late
     assert "--check-seconds gives more" in report.told(0.03)

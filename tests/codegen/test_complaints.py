@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import softehl
-from softehl.codegen.tools import build, cache, cli
+from softehl.codegen.tools import build, cache_store, cli
 from softehl.runtime.kernels.kernel import MissingKernelsError, StaleKernelsError
 
 MODEL = build.GENERATED.parent / "tests" / "codegen" / "pages" / "penalty_spring.py"
@@ -114,7 +114,7 @@ def test_a_write_that_fails_keeps_the_old_file(monkeypatch: pytest.MonkeyPatch) 
     Path("a.c").write_text("old")
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match=r"No space left on device: 'a\.c'"):
-        cache.write(Path("a.c"), b"new")
+        cache_store.write(Path("a.c"), b"new")
     assert Path("a.c").read_text() == "old"
     assert sorted(p.name for p in Path().iterdir()) == ["a.c", "mine.py"]
 

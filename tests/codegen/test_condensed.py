@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from softehl.codegen.elements import quadrature, shapes
 from softehl.codegen.language import kinematics
-from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature, shapes
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
 from softehl.runtime.kernels.kernel import load_kernel
 from tests.codegen.workshop import compiled, tangent_errors

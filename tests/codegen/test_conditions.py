@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from softehl.codegen.language.complaints import ModelError
+from softehl.codegen.elements import quadrature
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
 from softehl.runtime.kernels.kernel import ArgumentError, Kernel
 from tests.codegen.workshop import compiled

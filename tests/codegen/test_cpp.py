@@ -10,8 +10,8 @@ import cffi
 import pytest
 
 from softehl.codegen import abi
-from softehl.codegen.emit import source
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.elements import quadrature
+from softehl.codegen.emit import c_source
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build
 from tests.codegen.workshop import compiled
@@ -49,7 +49,7 @@ def test_a_kernel_is_called_from_cpp(tmp_path: Path) -> None:
 
 
 def test_cffi_reads_the_prototypes() -> None:
-    text = source.header([abi.function_name("spring", "energy")])
+    text = c_source.header([abi.function_name("spring", "energy")])
     kind = text[text.index("typedef void softehl_kernel") : text.index("#if !defined(__cplusplus)")]
     prototypes = text[
         text.index("softehl_kernel softehl") : text.rindex("#if defined(__cplusplus)")

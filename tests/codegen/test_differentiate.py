@@ -14,19 +14,19 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from softehl.codegen.abi import Task
-from softehl.codegen.derive import variants
-from softehl.codegen.derive.linearise import Linearisation
-from softehl.codegen.graph.differentiate import gradient
-from softehl.codegen.graph.evaluate import State, Walk, evaluate
+from softehl.codegen.derive import task_outputs
+from softehl.codegen.derive.multilevel_chain_rule import Linearisation
+from softehl.codegen.elements import quadrature
+from softehl.codegen.graph.differentiation import gradient
+from softehl.codegen.graph.evaluation import State, Walk, evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.partials import DifferentiationError, partials
-from softehl.codegen.graph.traverse import operations
-from softehl.codegen.language.complaints import ModelError
+from softehl.codegen.graph.partial_derivatives import DifferentiationError, partials
+from softehl.codegen.graph.traversal import operations
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.verify.graph_oracle import Oracle
 from tests.codegen.workshop import (
     close,
     difference,
@@ -452,7 +452,7 @@ def test_weak_forms_vary_only_what_is_varied() -> None:
     (xi,) = m.point()
     m.weak_form([(sp.sin(v) * xi**2, u), (u * v, v + xi * u)])
     d = m.finish()
-    assert Task.ENERGY not in variants.tasks(d)
+    assert Task.ENERGY not in task_outputs.tasks(d)
     state = State((0, 0), ("0.4", "-0.3"), (), (), RULE)
     R, K = linearised(d, state)
     assert matrices_agree((R, K), exact(d, state))
@@ -497,9 +497,9 @@ def _lagrange(nodes: list[Any], k: int, t: Any) -> tuple[Any, Any]:
 def test_a_mean_of_an_interpolated_field_may_not_enter_a_sum_again() -> None:
     """It would couple every mode at one point with every mode at another: no kernel for that."""
     d = line_model("again")
-    variants.outputs(d, Task.RESIDUAL)
+    task_outputs.outputs(d, Task.RESIDUAL)
     with pytest.raises(DifferentiationError, match="may not enter a sum again"):
-        variants.outputs(d, Task.TANGENT)
+        task_outputs.outputs(d, Task.TANGENT)
 
 
 def test_a_value_at_a_point_by_a_symbol_of_all_points() -> None:

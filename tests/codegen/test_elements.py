@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.elements.cells import ELEMENTS, Element, element
-from softehl.codegen.language.elements.quadrature import QuadratureRule
+from softehl.codegen.elements import quadrature
+from softehl.codegen.elements.cells import ELEMENTS, Element, element
+from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.runtime.mesh.cells import CELLS
 
 AT = (sp.Rational(1, 7), sp.Rational(2, 9), sp.Rational(-1, 5))

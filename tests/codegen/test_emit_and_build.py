@@ -13,15 +13,15 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import pipeline
-from softehl.codegen.abi import Task
-from softehl.codegen.emit.printer import number
-from softehl.codegen.graph.evaluate import State
+from softehl.codegen.abi import BuildError, Task
+from softehl.codegen.elements import quadrature
+from softehl.codegen.emit.c_printer import number
+from softehl.codegen.graph.evaluation import State
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import build, product, shipped
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.tools import build, output_files, shipped_kernels
+from softehl.codegen.verify.graph_oracle import Oracle
 from softehl.runtime.discretisation.quadrature import film_rule, gauss
 from softehl.runtime.kernels.kernel import (
     Kernel,
@@ -117,7 +117,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
     """One library of all throw-away models."""
     directory = tmp_path_factory.mktemp("generated")
     models = {d.name: d for d in (branched(), nested_sums(), line())}
-    texts = product.files([pipeline.compile_model(d) for d in models.values()])
+    texts = output_files.files([pipeline.compile_model(d) for d in models.values()])
     for name, text in texts.items():
         (directory / name).write_text(text, encoding="utf-8")
     build.build(directory)
@@ -315,8 +315,8 @@ def test_every_value_is_declared_once() -> None:
 
 def test_the_manifest_tells_costs_and_meanings() -> None:
     source = pipeline.compile_model(nested_sums())
-    text = product.files([source])["manifest.json"]
-    assert product.files([source])["manifest.json"] == text
+    text = output_files.files([source])["manifest.json"]
+    assert output_files.files([source])["manifest.json"] == text
     plan = source.functions[Task.TANGENT].plan
     for expected in (
         '"doc": "A sum feeds a sum."',
@@ -332,7 +332,7 @@ def test_the_manifest_tells_costs_and_meanings() -> None:
 
 def test_a_failed_build_shows_the_command_and_the_words_of_the_compiler(tmp_path: Path) -> None:
     (tmp_path / "broken.c").write_text("int f(void) { return no_such_name; }\n")
-    with pytest.raises(build.BuildError) as failed:
+    with pytest.raises(BuildError) as failed:
         build.build(tmp_path, extra=build.STRICT)
     message = str(failed.value)
     assert "the C compiler failed" in message
@@ -344,7 +344,7 @@ def test_a_failed_build_shows_the_command_and_the_words_of_the_compiler(tmp_path
 
 def test_warnings_are_errors_for_us_and_nothing_to_users(tmp_path: Path) -> None:
     (tmp_path / "sloppy.c").write_text("int f(int unused) { return 0; }\n")
-    with pytest.raises(build.BuildError, match="unused"):
+    with pytest.raises(BuildError, match="unused"):
         build.build(tmp_path, extra=build.STRICT)
     build.build(tmp_path)
 
@@ -355,7 +355,7 @@ def test_a_compiler_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     script.chmod(0o755)
     monkeypatch.setenv("CC", f"'{script}' --wrapped")
     (tmp_path / "a.c").write_text("int a;\n")
-    with pytest.raises(build.BuildError, match=r"failed \(3\)") as failed:
+    with pytest.raises(BuildError, match=r"failed \(3\)") as failed:
         build.build(tmp_path)
     assert "licence expired" in str(failed.value)
     assert f"'{script}' --wrapped -std=c11" in str(failed.value)
@@ -366,11 +366,11 @@ def test_a_missing_compiler(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("CC", "no-such-compiler -m64")
-    with pytest.raises(build.BuildError, match=r"'no-such-compiler' is not on the PATH.* set CC"):
+    with pytest.raises(BuildError, match=r"'no-such-compiler' is not on the PATH.* set CC"):
         build.build(tmp_path)
     assert list(tmp_path.iterdir()) == []
     before = {p.name: p.stat().st_mtime_ns for p in build.GENERATED.iterdir()}
-    assert shipped.main() == 2
+    assert shipped_kernels.main() == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert printed.err.startswith("softehl: no C compiler: 'no-such-compiler' is not on the PATH")
@@ -389,7 +389,7 @@ def test_a_failed_build_keeps_the_old_library(tmp_path: Path) -> None:
     library = tmp_path / build.LIBRARY
     before = library.read_bytes()
     (tmp_path / "places.c").write_text("syntax error\n")
-    with pytest.raises(build.BuildError):
+    with pytest.raises(BuildError):
         build.build(tmp_path)
     assert library.read_bytes() == before
     assert not [p for p in tmp_path.iterdir() if p.suffix == ".so" and p != library]

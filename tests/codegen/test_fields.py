@@ -14,11 +14,12 @@ import sympy as sp
 
 import softehl
 from softehl.codegen import pipeline
-from softehl.codegen.derive import structure
-from softehl.codegen.language.complaints import ModelError
+from softehl.codegen.derive import potential_structure
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.fields import Fields
-from softehl.codegen.language.pages import Form, Page
-from softehl.codegen.tools import build, library, verify
+from softehl.codegen.language.weak_form import Form, Page
+from softehl.codegen.tools import build, kernel_cache
+from softehl.codegen.verify import verification
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from softehl.runtime.mesh.cells import CELLS
@@ -199,9 +200,9 @@ def test_the_check_of_kernels_reads_the_page_of_a_point_kernel(tmp_path: Path) -
     wrong = replace(field_pages.rubber, write=other).definition("quad9")
     for definition, folder in ((d, tmp_path / "right"), (wrong, tmp_path / "wrong")):
         compiled(definition, folder)
-    right = verify.check(d, tasks, tmp_path / "right" / build.LIBRARY).errors
+    right = verification.check(d, tasks, tmp_path / "right" / build.LIBRARY).errors
     assert max(right.values()) < 1e-13
-    assert verify.check(d, tasks, tmp_path / "wrong" / build.LIBRARY).errors["energy"] > 1e-10
+    assert verification.check(d, tasks, tmp_path / "wrong" / build.LIBRARY).errors["energy"] > 1e-10
 
 
 @pytest.mark.slow
@@ -213,7 +214,7 @@ def test_one_page_has_exact_derivatives_on_ten_cells(cell: str, tmp_path: Path) 
     d = field_pages.rubber.definition(cell)
     compiled(d, tmp_path)
     tasks = ["residual", "tangent", "fields"]
-    errors = verify.check(d, tasks, tmp_path / build.LIBRARY).errors
+    errors = verification.check(d, tasks, tmp_path / build.LIBRARY).errors
     assert sorted(errors) == sorted(tasks)
     assert max(errors.values()) < 1e-13
 
@@ -255,10 +256,12 @@ def test_derivatives_that_are_asked_for_later_are_known_at_the_point() -> None:
 
 def test_invariants_are_looked_for_in_the_plane_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     searched = []
-    monkeypatch.setattr(structure, "through_invariants", lambda *given: searched.append(given))
-    structure.found_in(field_pages.rubber.definition("tet4"))
+    monkeypatch.setattr(
+        potential_structure, "through_invariants", lambda *given: searched.append(given)
+    )
+    potential_structure.found_in(field_pages.rubber.definition("tet4"))
     assert not searched
-    structure.found_in(field_pages.rubber.definition("tri3"))
+    potential_structure.found_in(field_pages.rubber.definition("tri3"))
     assert searched
 
 
@@ -289,7 +292,7 @@ def test_tangents_of_moduli_are_one_file_for_all_pages() -> None:
         m.minimise(a * (F.T * F).trace() ** 2)
 
     pages = [field_pages.rubber, other]
-    shared = [set(library.derive([p.definition("quad9")])[0]) for p in pages]
+    shared = [set(kernel_cache.derive([p.definition("quad9")])[0]) for p in pages]
     (name,) = {n for n in shared[0] if n.startswith(build.SHARED)}
     assert name in shared[1]
 

@@ -17,7 +17,7 @@ import pytest
 from softehl.codegen import pipeline
 from softehl.codegen.emit.liveness import peak_live
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import cli, table
+from softehl.codegen.tools import cli, cost_table
 from softehl.codegen.tools.build import GENERATED
 
 DIGEST = """
@@ -173,7 +173,7 @@ def test_the_cost_table_lists_every_kernel(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "120")
-    assert table.kernels() == 0
+    assert cost_table.kernels() == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in (*ALL, "temporaries"))
 
@@ -182,7 +182,7 @@ def test_the_cost_table_keeps_names_whole(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    assert table.kernels() == 0
+    assert cost_table.kernels() == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in ALL)
 

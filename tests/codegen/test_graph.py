@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 
 from softehl.codegen.graph.graph import FREE, Graph, Node, Op
-from softehl.codegen.graph.traverse import operations, reachable
+from softehl.codegen.graph.traversal import operations, reachable
 from tests.codegen.workshop import unknowns
 
 

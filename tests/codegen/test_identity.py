@@ -11,14 +11,14 @@ import sympy as sp
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from softehl.codegen.graph.evaluate import evaluate
-from softehl.codegen.graph.field import PRIME, close_rational
+from softehl.codegen.graph.evaluation import evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.spec import check
-from softehl.codegen.graph.traverse import operations
-from softehl.codegen.language.lower import Lowering
-from softehl.codegen.optimise.identity import merge_equal
+from softehl.codegen.graph.prime_field import PRIME, close_rational
+from softehl.codegen.graph.traversal import operations
+from softehl.codegen.graph.verifier import check
+from softehl.codegen.language.sympy_lowering import Lowering
 from softehl.codegen.optimise.passes import powers, run, straight_line
+from softehl.codegen.optimise.value_numbering import merge_equal
 from tests.codegen.random_models import UNKNOWNS, Digits, K, Meaning, OutsideError, Recipe
 from tests.codegen.random_models import expressions as random_expressions
 from tests.codegen.workshop import inputs, same_value

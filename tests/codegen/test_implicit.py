@@ -12,18 +12,18 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import pipeline
-from softehl.codegen.graph.differentiate import gradient
-from softehl.codegen.graph.evaluate import State, evaluate
+from softehl.codegen.elements import quadrature
+from softehl.codegen.graph.differentiation import gradient
+from softehl.codegen.graph.evaluation import State, evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.routines import Newton, inverse
-from softehl.codegen.graph.spec import IllegalGraphError, check
-from softehl.codegen.graph.traverse import reachable
-from softehl.codegen.language.complaints import ModelError
+from softehl.codegen.graph.traversal import reachable
+from softehl.codegen.graph.verifier import IllegalGraphError, check
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import build, product
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.tools import build, output_files
+from softehl.codegen.verify.graph_oracle import Oracle
 from softehl.runtime.kernels.kernel import ArgumentError, Kernel, load_kernel
 from tests.codegen.workshop import compiled, difference, element_state, off, tangent_errors
 
@@ -70,7 +70,7 @@ def family(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Definiti
     """One library of systems of all sizes, looped and written out."""
     directory = tmp_path_factory.mktemp("coupled")
     models = {d.name: d for d in (coupled(n, unroll=u) for n, u in SIZES)}
-    texts = product.files([pipeline.compile_model(d) for d in models.values()])
+    texts = output_files.files([pipeline.compile_model(d) for d in models.values()])
     for name, text in texts.items():
         (directory / name).write_text(text, encoding="utf-8")
     build.build(directory, extra=(*build.STRICT, "-O1"))

@@ -13,15 +13,15 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import pipeline
-from softehl.codegen.derive import structure
-from softehl.codegen.derive.interfaces import Interface, linear_interface
-from softehl.codegen.graph.evaluate import State
-from softehl.codegen.graph.traverse import strip
+from softehl.codegen.derive import potential_structure
+from softehl.codegen.derive.linear_interfaces import Interface, linear_interface
+from softehl.codegen.elements import quadrature
+from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.traversal import strip
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.verify.graph_oracle import Oracle
 from tests.codegen.workshop import compiled, linearised
 
 QUAD = ((1, 1, 1, 1), (-1, 1, 1, -1), (-1, -1, 1, 1), (1, -1, 1, -1))
@@ -36,7 +36,7 @@ def interface_of(d: Definition) -> Interface:
 
 
 def without_interface(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(structure, "linear_interface", lambda g, roots, sources: None)
+    patch.setattr(potential_structure, "linear_interface", lambda g, roots, sources: None)
 
 
 # ----------------------------------------------------------------------------------- what is found
@@ -116,7 +116,7 @@ def close(a: Any, b: Any) -> bool:
 def test_values_are_those_of_direct_differentiation(monkeypatch: pytest.MonkeyPatch) -> None:
     state = at_rule(STATE)
     R, K = linearised(bar(), state)
-    assert structure.found_in(bar())
+    assert potential_structure.found_in(bar())
     assert close(R, Oracle(bar()).residual(state))
     assert close(K, Oracle(bar()).tangent(state))
     without_interface(monkeypatch)
@@ -136,7 +136,7 @@ def test_a_wrong_interface_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         first = ((source, c * (1 + Fraction(1, 10**9))), *rest)
         return replace(found, matrix=(first, *found.matrix[1:]))
 
-    monkeypatch.setattr(structure, "linear_interface", off)
+    monkeypatch.setattr(potential_structure, "linear_interface", off)
     state = at_rule(STATE)
     R, K = linearised(bar(), state)
     assert not close(R, Oracle(bar()).residual(state))
@@ -158,7 +158,7 @@ def guarded() -> Definition:
 @pytest.mark.parametrize("k", [0.7, -0.7])
 def test_an_interface_takes_nothing_out_of_its_branch(k: float, tmp_path: Path) -> None:
     d = guarded()
-    assert not structure.found_in(d)
+    assert not potential_structure.found_in(d)
     kernel = compiled(d, tmp_path)
     u = [0.4, -1.3]
     R, K = kernel.tangent(np.zeros((1, 2)), np.array([u]), parameters=[k])
@@ -171,4 +171,4 @@ def test_branches_without_such_values_keep_their_interface() -> None:
     m = Model("harmless", nodes=1, rule=quadrature.point_rule())
     x, y = m.unknown("x"), m.unknown("y")
     m.potential(sp.Max(x + y, 0) ** 3 + (x - y) ** 4)
-    assert structure.found_in(m.finish())
+    assert potential_structure.found_in(m.finish())

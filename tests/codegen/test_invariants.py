@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from softehl.codegen.derive.invariants import Reduced, through_invariants
+from softehl.codegen.derive.potential_structure import Reduced, through_invariants
 from softehl.codegen.graph.graph import Graph, Node, Op
 from tests.codegen.workshop import inputs, same_value, unknowns
 

@@ -17,13 +17,13 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import pipeline
-from softehl.codegen.emit import source
-from softehl.codegen.graph.evaluate import State
+from softehl.codegen.elements import quadrature
+from softehl.codegen.emit import c_source
+from softehl.codegen.graph.evaluation import State
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import build, timing
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.tools import build, user_kernels
+from softehl.codegen.verify.graph_oracle import Oracle
 from softehl.runtime.discretisation.quadrature import film_rule
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.workshop import element_state, off, write
@@ -228,7 +228,7 @@ def functions(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[[str, Any], Any]:
     folder = tmp_path_factory.mktemp("functions")
-    (folder / source.HEADER).write_text(source.header([]))
+    (folder / c_source.HEADER).write_text(c_source.header([]))
     (folder / "run.c").write_text(DRIVER)
     flags = [f for f in build.FLAGS if f != "-shared"]
     line = [*build.compiler(), *flags, request.param, "-Wno-psabi", "-shared"]
@@ -315,6 +315,6 @@ def test_long_loops_that_pages_share_are_compiled_lightly() -> None:
 def test_the_time_of_an_element_is_measured(library: Any) -> None:
     d, kernel = library["branched"]
     tasks = ("energy", "residual", "tangent", "fields")
-    found = timing.nanoseconds(d, tasks, Path(kernel.library.path))
+    found = user_kernels.nanoseconds(d, tasks, Path(kernel.library.path))
     assert list(found) == list(tasks)
     assert all(0 < t < 1e5 for t in found.values())

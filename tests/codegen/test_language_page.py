@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.lower import SUPPORTED
 from softehl.codegen.language.model import Model
+from softehl.codegen.language.sympy_lowering import SUPPORTED
 from softehl.runtime.kernels.kernel import Kernel
 from tests.codegen.workshop import compiled, tangent_errors
 

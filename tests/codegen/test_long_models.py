@@ -10,15 +10,15 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import pipeline
-from softehl.codegen.graph.evaluate import State
+from softehl.codegen.elements import quadrature
+from softehl.codegen.graph.evaluation import State
 from softehl.codegen.graph.graph import Graph, Op
-from softehl.codegen.graph.traverse import Recursion, recursion
-from softehl.codegen.language.complaints import ModelError
+from softehl.codegen.graph.traversal import Recursion, recursion
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.lower import Lowering
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.language.sympy_lowering import Lowering
+from softehl.codegen.verify.graph_oracle import Oracle
 from tests.codegen.workshop import compiled
 
 STATE = State((), (0.7, -0.4))

@@ -9,14 +9,14 @@ import mpmath
 import pytest
 import sympy as sp
 
-from softehl.codegen.graph.evaluate import evaluate
+from softehl.codegen.elements import quadrature
+from softehl.codegen.graph.evaluation import evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.traverse import operations, reachable
+from softehl.codegen.graph.traversal import operations, reachable
 from softehl.codegen.language import kinematics as kin
-from softehl.codegen.language.complaints import ModelError
-from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.lower import Lowering
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
+from softehl.codegen.language.sympy_lowering import Lowering
 from tests.codegen.workshop import close, inputs, unknowns
 
 x, y = sp.symbols("x y", real=True)

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 import sympy as sp
 
+from softehl.codegen.elements import cells, quadrature, shapes
+from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.language import kinematics
-from softehl.codegen.language.complaints import ModelError, ModelWarning
-from softehl.codegen.language.elements import cells, quadrature, shapes
-from softehl.codegen.language.elements.quadrature import QuadratureRule
+from softehl.codegen.language.errors import ModelError, ModelWarning
 from softehl.codegen.language.model import Model
 
 GAUSS, SIMPLEX = quadrature.gauss(2, 2), quadrature.triangle(2)

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from softehl.codegen.language import names, pages, symbols
-from softehl.codegen.language.complaints import ModelError
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.elements import quadrature
+from softehl.codegen.language import named_symbols, sympy_lowering, weak_form
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import files, user
+from softehl.codegen.tools import model_loader, user_kernels
 
 x = sp.Symbol("x", real=True)
 PLAIN = ((1 + x) ** 2, (1 + x) ** 3)
@@ -45,7 +45,7 @@ def page(request: pytest.FixtureRequest) -> Iterator[Page]:
     if not request.param:
         yield Page()
         return
-    with names.written_out():
+    with named_symbols.written_out():
         yield Page()
 
 
@@ -200,15 +200,15 @@ def test_the_check_reads_a_page_with_its_names_written_out(
     path = tmp_path / "bar.py"
     path.write_text(BAR)
     monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "right"))
-    assert files.generate([path]) == 0
+    assert user_kernels.generate([path]) == 0
 
     def blind(label: str, value: Any, **how: Any) -> Any:
-        seen = names._WRITTEN.get()
-        return names.named(label, value, **how) if seen else sp.Symbol(label, real=True)
+        seen = named_symbols._WRITTEN.get()
+        return named_symbols.named(label, value, **how) if seen else sp.Symbol(label, real=True)
 
-    monkeypatch.setattr(symbols, "named", blind)
+    monkeypatch.setattr(sympy_lowering, "named", blind)
     monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "wrong"))
-    assert files.generate([path]) == 1
+    assert user_kernels.generate([path]) == 1
     printed = capsys.readouterr().err
     assert "bar: residual is off by" in printed
     assert "bar: tangent is off by" in printed
@@ -217,8 +217,8 @@ def test_the_check_reads_a_page_with_its_names_written_out(
 def test_a_page_that_cannot_be_written_out_is_compared_with_itself(tmp_path: Path) -> None:
     path = tmp_path / "odd.py"
     path.write_text(BAR.replace("W = mu", "I1.name\n    W = mu"))
-    assert user.written_out(path) == {}
-    assert [d.name for d in user.definitions(path)] == ["bar"]
+    assert model_loader.written_out(path) == {}
+    assert [d.name for d in model_loader.definitions(path)] == ["bar"]
 
 
 def test_the_inverse_of_a_matrix_of_a_page_is_written_out() -> None:
@@ -237,4 +237,4 @@ def test_the_inverse_of_a_matrix_of_a_page_is_written_out() -> None:
             (F[:2, :2] * 0).inv()
         m.minimise((F.inv() * F.inv().T).trace())
 
-    assert pages.Page("write", write).definition("hex8").name == "write_hex8"
+    assert weak_form.Page("write", write).definition("hex8").name == "write_hex8"

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import softehl
-from softehl.codegen.tools import library, user
+from softehl.codegen.tools import kernel_cache, model_loader
 from softehl.runtime.kernels.kernel import Kernel
 
 SPRING = """
@@ -42,8 +42,8 @@ def model(first: str, energy: str = "FACTOR * k * u", name: str = "mine.py") -> 
 
 def said(path: Path) -> str:
     """What the model of a file says, by its digest."""
-    (definition,) = user.definitions(path)
-    return library.fingerprint(definition)
+    (definition,) = model_loader.definitions(path)
+    return kernel_cache.fingerprint(definition)
 
 
 def factor(value: int) -> str:
@@ -133,7 +133,7 @@ def test_a_table_that_a_model_reads_is_in_its_key(
         found.append(residual(softehl.load_kernel("mine.py")))
     assert found == [3.0, 5.0, 3.0]
     runs = []
-    monkeypatch.setattr(user, "definitions_and_inputs", lambda *a: runs.append(a))
+    monkeypatch.setattr(model_loader, "definitions_and_inputs", lambda *a: runs.append(a))
     assert residual(softehl.load_kernel("mine.py")) == 3.0
     assert runs == [], "nothing has changed since it was stored"
     (place / "table.txt").unlink()

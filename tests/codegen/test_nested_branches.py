@@ -12,8 +12,8 @@ import sympy as sp
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
-from softehl.codegen.language.complaints import ModelError
-from softehl.codegen.tools import build, product
+from softehl.codegen.language.errors import ModelError
+from softehl.codegen.tools import build, output_files
 from softehl.runtime.kernels.kernel import load_kernel
 from tests.codegen.nested_models import (
     Nested,
@@ -59,7 +59,7 @@ TREES = {
 def compiled(models: Sequence[Nested], target: Target, folder: Path) -> None:
     """All kernels of some models in one library."""
     made = [pipeline.compile_model(m.definition(), target) for m in models]
-    for name, text in product.files(made).items():
+    for name, text in output_files.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
     build.build(folder, extra=(*build.STRICT, "-O1"))
 

@@ -10,9 +10,9 @@ import sympy as sp
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.elements import quadrature
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import build, product
+from softehl.codegen.tools import build, output_files
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
 u, v, k = sp.symbols("u v k", real=True)
@@ -65,7 +65,7 @@ def kernels(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
         local("local"),
     ]
     made = [pipeline.compile_model(m.finish(), request.param) for m in models]
-    for name, text in product.files(made).items():
+    for name, text in output_files.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
     build.build(folder, extra=(*build.STRICT, "-O1"))
     return folder

@@ -6,9 +6,8 @@ import re
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Task
-from softehl.codegen.emit.filled import WIDTH, filled
-from softehl.codegen.emit.once import used_once
-from softehl.codegen.emit.schedule import schedule
+from softehl.codegen.emit.c_printer import WIDTH, filled, used_once
+from softehl.codegen.emit.code_motion import schedule
 from softehl.codegen.graph.graph import Graph, Op
 from softehl.codegen.models import ALL
 

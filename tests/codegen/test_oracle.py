@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.codegen.graph.evaluate import Walk
+from softehl.codegen.graph.evaluation import Walk
 from softehl.codegen.graph.graph import Node, Op
-from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import ALL
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.verify.graph_oracle import Oracle
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.element_states import Case, all_cases

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from softehl.codegen.emit.order import arranged
+from softehl.codegen.emit.instruction_scheduling import arranged
 from softehl.codegen.graph.graph import FREE, Graph, Node, Op
-from softehl.codegen.graph.traverse import operations, reachable
+from softehl.codegen.graph.traversal import operations, reachable
 from tests.codegen.workshop import inputs, same_value, unknowns
 
 

@@ -12,11 +12,11 @@ import sympy as sp
 from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
-from softehl.codegen.graph.evaluate import State, Walk
-from softehl.codegen.language.complaints import ModelError
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.elements import quadrature
+from softehl.codegen.graph.evaluation import State, Walk
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import user
+from softehl.codegen.tools import model_loader
 from softehl.codegen.tools.model_text import ModelFileError
 from tests.codegen.random_models import UNKNOWNS, expressions
 
@@ -113,7 +113,7 @@ def test_a_page_is_right_or_an_error_with_its_line(
     path.write_text(PAGE.replace(legal, wrong, 1))
     message = ""
     try:
-        (d,) = user.definitions(path)
+        (d,) = model_loader.definitions(path)
         assert d.name
     except ModelFileError as error:
         message = str(error)

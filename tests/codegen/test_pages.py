@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from softehl.codegen.elements import shapes
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import shapes
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.verify.graph_oracle import Oracle
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.kernel import Kernel, Rule
 from tests.codegen.pages.gent import gent

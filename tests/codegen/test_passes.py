@@ -8,17 +8,17 @@ import mpmath
 import pytest
 
 from softehl.codegen.abi import Task
-from softehl.codegen.derive import variants
-from softehl.codegen.emit.schedule import schedule
-from softehl.codegen.graph.evaluate import evaluate
+from softehl.codegen.derive import task_outputs
+from softehl.codegen.emit.code_motion import schedule
+from softehl.codegen.graph.evaluation import evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.spec import check
-from softehl.codegen.graph.traverse import operations, reachable
+from softehl.codegen.graph.traversal import operations, reachable
+from softehl.codegen.graph.verifier import check
 from softehl.codegen.models import ALL
 from softehl.codegen.optimise import passes
-from softehl.codegen.optimise.factors import factor
+from softehl.codegen.optimise.common_sums import common_sums
+from softehl.codegen.optimise.factoring import factor
 from softehl.codegen.optimise.passes import STANDARD, Pass
-from softehl.codegen.optimise.sums import common_sums
 from tests.codegen.workshop import close, inputs, same_value, unknowns
 
 AT = inputs("1.3", "0.7", "2.9", "0.41")
@@ -373,8 +373,8 @@ SOME = ("solid_taylor_mean", "contact_corner", "film", "film_rough", "film_eyrin
 )
 def test_graphs_of_shipped_models_stay_legal_and_get_cheaper(name: str) -> None:
     d = ALL[name]()
-    for task in variants.tasks(d):
-        roots = [x.node for x in variants.outputs(d, task)]
+    for task in task_outputs.tasks(d):
+        roots = [x.node for x in task_outputs.outputs(d, task)]
         check(roots)
         first = operations(roots)
         for p in STANDARD:

@@ -20,17 +20,17 @@ from hypothesis import HealthCheck, Phase, given, settings
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, Task
-from softehl.codegen.derive import variants
-from softehl.codegen.emit.runs import arranged_plan
-from softehl.codegen.emit.schedule import If, Same, Schedule, Statement, schedule
-from softehl.codegen.graph.arithmetic import number
-from softehl.codegen.graph.evaluate import State
+from softehl.codegen.derive import task_outputs
+from softehl.codegen.emit.basic_blocks import arranged_plan
+from softehl.codegen.emit.code_motion import If, Same, Schedule, Statement, schedule
+from softehl.codegen.graph.evaluation import State
 from softehl.codegen.graph.graph import Graph, Input, Node, Op
-from softehl.codegen.graph.spec import check
-from softehl.codegen.graph.traverse import rewrite
+from softehl.codegen.graph.precise_arithmetic import number
+from softehl.codegen.graph.traversal import rewrite
+from softehl.codegen.graph.verifier import check
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
-from softehl.codegen.tools import build, product
+from softehl.codegen.tools import build, output_files
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.random_models import (
     DIGITS,
@@ -77,7 +77,7 @@ def library(target: Target) -> dict[str, Kernel]:
     """Every random model compiled for a target, in one shared library."""
     directory = Path(tempfile.mkdtemp(prefix="random_models_"))
     models = [r.definition(name) for name, r in population().items()]
-    texts = product.files([pipeline.compile_model(d, target) for d in models])
+    texts = output_files.files([pipeline.compile_model(d, target) for d in models])
     for name, text in texts.items():
         (directory / name).write_text(text, encoding="utf-8")
     build.build(directory, extra=(*build.STRICT, "-O0"))
@@ -227,7 +227,7 @@ def test_every_pass_keeps_every_value() -> None:
     for name, d, state in cases():
         points = [[rounded(x) for x in row] for row in state.rule]
         for chosen in (passes.STANDARD, passes.straight_line(points)):
-            roots = [x.node for x in variants.outputs(d, Task.TANGENT)]
+            roots = [x.node for x in task_outputs.outputs(d, Task.TANGENT)]
             check(roots)
             before = values(d, roots, state)
             for p in chosen:
@@ -247,7 +247,7 @@ def test_a_wrong_pass_is_refused() -> None:
     """Branches swapped in one model; a factor lost in all."""
     refused = 0
     for _, d, state in cases():
-        roots = [x.node for x in variants.outputs(d, Task.TANGENT)]
+        roots = [x.node for x in task_outputs.outputs(d, Task.TANGENT)]
 
         def wrong(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
             if n.op is Op.MUL and args[0].op is Op.CONST:
@@ -314,7 +314,7 @@ def executed(plan: Schedule, roots: Sequence[Node], state: State) -> list[list[A
 def test_a_schedule_stores_before_it_loads() -> None:
     for name, d, state in cases():
         for task in (Task.RESIDUAL, Task.TANGENT):
-            roots = [x.node for x in variants.outputs(d, task)]
+            roots = [x.node for x in task_outputs.outputs(d, task)]
             roots, _ = passes.run(d.graph, roots, passes.STANDARD)
             plan, exact = schedule(roots), values(d, roots, state)
             assert same(executed(plan, roots, state), exact), name

@@ -12,12 +12,12 @@ import sympy as sp
 
 import softehl
 from softehl.codegen.abi import Task
+from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.optimise import passes
-from softehl.codegen.tools import quick
+from softehl.codegen.verify import quick_check
 from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.kernels.shared_library import library_of
 
@@ -62,13 +62,15 @@ def test_a_wrong_derivative_is_refused_and_not_remembered(
     # the last entry of a residual, of a tangent and of the residual that stands before it
     fault(lambda g, n: g.mul(g.const(2), n))
     for _ in range(2):
-        with pytest.raises(quick.WrongKernelError, match=f"spring: {words}"):
+        with pytest.raises(quick_check.WrongKernelError, match=f"spring: {words}"):
             softehl.load_kernel(spring("spring", tasks))
 
 
 def test_a_value_that_is_not_a_number_is_refused(fault: Callable[[Last], None]) -> None:
     fault(lambda g, n: g.power(g.sub(g.neg(g.one), g.mul(n, n)), sp.Rational(1, 2)))
-    with pytest.raises(quick.WrongKernelError, match="spring: residual is not a number where"):
+    with pytest.raises(
+        quick_check.WrongKernelError, match="spring: residual is not a number where"
+    ):
         softehl.load_kernel(spring("spring", [Task.RESIDUAL]))
 
 
@@ -76,13 +78,13 @@ def test_a_checked_kernel_is_not_checked_again(
     fault: Callable[[Last], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls: list[str] = []
-    right = quick.check
+    right = quick_check.check
 
     def check(d: Definition, *given: Any) -> None:
         calls.append(d.name)
         right(d, *given)
 
-    monkeypatch.setattr(quick, "check", check)
+    monkeypatch.setattr(quick_check, "check", check)
     for name in ("once", "once", "other"):
         softehl.load_kernel(spring(name, [Task.RESIDUAL]))
     assert calls == ["once", "other"]
@@ -108,4 +110,4 @@ def test_shipped_kernels_pass() -> None:
     library = library_of().path
     for name, make in ALL.items():
         kernel = load_kernel(name)
-        quick.check(make(), list(kernel.tasks), library)
+        quick_check.check(make(), list(kernel.tasks), library)

@@ -16,9 +16,9 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import pipeline
-from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.tools import build, product
+from softehl.codegen.language.errors import ModelError
+from softehl.codegen.tools import build, output_files
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS
@@ -248,7 +248,7 @@ def defined(seed: int) -> tuple[RandomPage, Definition]:
 def comparisons(pages: Sequence[tuple[RandomPage, Definition]], folder: Path) -> list[Comparison]:
     """Kernels of pages in one library."""
     made = [pipeline.compile_model(d) for _, d in pages]
-    for name, text in product.files(made).items():
+    for name, text in output_files.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
     build.build(folder, extra=(*build.STRICT, "-O1"))
     return [

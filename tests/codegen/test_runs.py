@@ -7,11 +7,11 @@ from fractions import Fraction
 from itertools import pairwise
 from operator import add, mul, sub
 
-from softehl.codegen.emit.runs import PART, arranged_plan
-from softehl.codegen.emit.schedule import Loop, Same, Schedule, schedule
-from softehl.codegen.emit.simd import added_at_once
+from softehl.codegen.emit.basic_blocks import PART, arranged_plan
+from softehl.codegen.emit.code_motion import Loop, Same, Schedule, schedule
+from softehl.codegen.emit.simd_kernel import added_at_once
 from softehl.codegen.graph.graph import FREE, Graph, Input, Node, Op
-from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.graph.traversal import reachable
 from tests.codegen.test_order import matrix_product, misplaced
 from tests.codegen.workshop import unknowns
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from softehl.codegen.emit.schedule import If, Loop, Statement, schedule
+from softehl.codegen.emit.code_motion import If, Loop, Statement, schedule
 from softehl.codegen.graph.graph import Graph, Node, Op
 from tests.codegen.workshop import unknowns
 

@@ -12,12 +12,12 @@ import sympy as sp
 
 import softehl
 from softehl.codegen import pipeline
-from softehl.codegen.language.complaints import ModelError
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.elements import quadrature
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.material import Law, Material, material
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import build, product
+from softehl.codegen.tools import build, output_files
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
@@ -83,7 +83,7 @@ def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("sides")
     models = [power_hardening(), armstrong_frederick(), direction(True), direction(False)]
     made = [pipeline.compile_model(m.finish()) for m in (*models, own_root())]
-    for name, text in product.files(made).items():
+    for name, text in output_files.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
     build.build(folder, extra=(*build.STRICT, "-O1"))
     return folder

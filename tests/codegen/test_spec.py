@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.spec import ARITY, IllegalGraphError, check
+from softehl.codegen.graph.verifier import ARITY, IllegalGraphError, check
 
 
 def test_a_legal_graph_passes() -> None:

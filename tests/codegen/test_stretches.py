@@ -12,17 +12,18 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from softehl.codegen.graph.differentiate import gradient
-from softehl.codegen.graph.evaluate import State
+from softehl.codegen.elements import quadrature
+from softehl.codegen.graph.differentiation import gradient
+from softehl.codegen.graph.evaluation import State
 from softehl.codegen.graph.graph import Op
 from softehl.codegen.graph.routines import Isotropic, upper
-from softehl.codegen.graph.traverse import reachable
-from softehl.codegen.language.complaints import ModelError
+from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import build, verify
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.tools import build
+from softehl.codegen.verify import verification
+from softehl.codegen.verify.graph_oracle import Oracle
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors, write
@@ -306,8 +307,8 @@ def test_the_derivative_by_a_matrix_is_symmetric(tmp_path: Path) -> None:
     found = kernel.fields_at(*at).reshape(2, 3, 3)
     np.testing.assert_allclose(found, [right, right], rtol=0, atol=1e-14)
     np.testing.assert_allclose(kernel.residual(*at).reshape(3, 3), 4 * F_at @ right, atol=1e-13)
-    checked = verify.check(d, ("residual", "fields"), tmp_path / build.LIBRARY, seconds=1)
-    assert max(checked.errors.values()) <= verify.BOUND
+    checked = verification.check(d, ("residual", "fields"), tmp_path / build.LIBRARY, seconds=1)
+    assert max(checked.errors.values()) <= verification.BOUND
 
 
 def test_derivatives_of_the_oracle_are_differences() -> None:

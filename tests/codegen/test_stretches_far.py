@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.elements import quadrature
 from softehl.codegen.language.model import Model
 from tests.codegen.workshop import compiled
 

@@ -12,7 +12,7 @@ import pytest
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import build, cli, product
+from softehl.codegen.tools import build, cli, output_files
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.element_states import Case, all_cases
 
@@ -25,7 +25,7 @@ def scalar(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Kernels of target `scalar`."""
     directory = tmp_path_factory.mktemp("scalar")
     kernels = [pipeline.compile_model(ALL[name](), Target.SCALAR) for name in FAMILIES]
-    for name, text in product.files(kernels).items():
+    for name, text in output_files.files(kernels).items():
         (directory / name).write_text(text, encoding="utf-8")
     build.build(directory, extra=(*build.STRICT, "-O1"))
     return directory

@@ -12,12 +12,12 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import abi, pipeline
+from softehl.codegen.elements import quadrature, shapes
 from softehl.codegen.language import kinematics as kin
-from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature, shapes
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.verify.graph_oracle import Oracle
 from softehl.runtime.discretisation.quadrature import film_rule, several
 from softehl.runtime.kernels.kernel import ArgumentError, Kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors

@@ -16,12 +16,12 @@ from hypothesis import given
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, TargetError
+from softehl.codegen.elements import quadrature
 from softehl.codegen.emit import ufcx as emit_ufcx
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import samples
+from softehl.codegen.verify import random_states
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.element_blocks import ElementBlock
@@ -244,7 +244,7 @@ def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -
     """Cells of two mixed fields with data and history, against the batched kernel."""
     place = tmp_path_factory.mktemp("random")
     kernels, batch = cell_kernels(d, place), compiled(d, place)
-    (s,) = samples.admissible(d, 1)
+    (s,) = random_states.admissible(d, 1)
     at, dim = emit_ufcx.places(d), len(d.coordinates)
     w, vertices = np.empty(len(at)), np.zeros((d.nodes, 3))
     w[at] = s.dofs

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import softehl
-from softehl.codegen.tools import cli, compare, library, location, model_text, user, verify
-from softehl.codegen.tools import files as cli_files
+from softehl.codegen.tools import cache_dir, cli, kernel_cache, model_loader, model_text
+from softehl.codegen.tools import user_kernels as cli_files
 from softehl.codegen.tools.build import DIGEST, LIBRARY
 from softehl.codegen.tools.model_text import ModelFileError
+from softehl.codegen.verify import comparison, verification
 from softehl.runtime.kernels.kernel import ArgumentError, MissingKernelsError, StaleKernelsError
 
 SPRING = """
@@ -57,7 +58,7 @@ def run(*arguments: str) -> int:
 
 
 def names(text: str) -> list[str]:
-    return [d.name for d in user.definitions(model_file(text))]
+    return [d.name for d in model_loader.definitions(model_file(text))]
 
 
 def test_annotated_functions_without_arguments_are_models_in_the_order_of_the_file() -> None:
@@ -132,7 +133,7 @@ def test_what_is_wrong_is_said_in_one_line_with_the_line(
     text: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(ModelFileError, match=message):
-        user.definitions(model_file(text))
+        model_loader.definitions(model_file(text))
     assert run("mine.py") == 2
     printed = capsys.readouterr()
     assert printed.err.startswith("softehl: ")
@@ -155,7 +156,7 @@ def test_running_a_model_leaves_no_trace() -> None:
         set(sys.modules),
         [*sys.path],
     )
-    user.definitions(path)
+    model_loader.definitions(path)
     assert set(sys.modules) == modules
     assert sys.path == places
     assert not Path("__pycache__").exists()
@@ -304,7 +305,7 @@ def test_a_wrong_kernel_is_caught_whichever_task_is_wrong(
 ) -> None:
     """The check must fail on C that is wrong: one number is changed in one function at a time."""
     model_file(spring(energy="k * u**3 / 5"))
-    definitions, made = library.of_files([Path("mine.py")])
+    definitions, made = kernel_cache.of_files([Path("mine.py")])
     derived = dict(made.files)
     for task in ("energy", "residual", "tangent"):
         text = derived["spring.c"]
@@ -312,9 +313,11 @@ def test_a_wrong_kernel_is_caught_whichever_task_is_wrong(
         wrong = text[:start] + text[start:].replace("parameters[0]", "1.0000001 * parameters[0]", 1)
         assert wrong != text
         files = {**derived, "spring.c": wrong}
-        folder, _ = library.compiled(files)
-        errors = verify.errors(definitions[0], ("energy", "residual", "tangent"), folder / LIBRARY)
-        assert {t for t, e in errors.items() if e > verify.BOUND} == {task}
+        folder, _ = kernel_cache.compiled(files)
+        errors = verification.errors(
+            definitions[0], ("energy", "residual", "tangent"), folder / LIBRARY
+        )
+        assert {t for t, e in errors.items() if e > verification.BOUND} == {task}
         assert errors[task] < 1e-6
         assert cli_files._judge("spring", errors) == 1
         assert f"spring: {task} is off by" in capsys.readouterr().err
@@ -331,7 +334,7 @@ def test_derivatives_that_a_page_gives_itself_are_not_compared(
 
 def test_not_a_number_fails_the_check() -> None:
     assert cli_files._judge("it", {"tangent": float("inf")}) == 1
-    assert compare.finite(float("nan")) == float("inf")
+    assert comparison.finite(float("nan")) == float("inf")
 
 
 def test_a_model_far_from_its_domain_says_what_to_give(capsys: pytest.CaptureFixture[str]) -> None:
@@ -437,7 +440,7 @@ def test_one_of_several_models_is_named() -> None:
 
 
 def test_definitions_shipped_names_and_folders_are_loaded() -> None:
-    (definition,) = user.definitions(model_file(spring()))
+    (definition,) = model_loader.definitions(model_file(spring()))
     kernel = softehl.load_kernel(definition)
     assert kernel.name == "spring"
     assert softehl.load_kernel("solid_q4").name == "solid_q4"
@@ -457,10 +460,10 @@ def test_definitions_shipped_names_and_folders_are_loaded() -> None:
 
 def test_equal_definitions_have_one_fingerprint_and_different_ones_differ() -> None:
     texts = [spring(), spring(), spring(energy="k * u**2 / 3"), spring().replace("[N/mm]", "[N]")]
-    prints = [library.fingerprint(user.definitions(model_file(t))[0]) for t in texts]
+    prints = [kernel_cache.fingerprint(model_loader.definitions(model_file(t))[0]) for t in texts]
     assert prints[0] == prints[1]
     assert len(set(prints)) == 3
-    assert location.root().name == "cache"
+    assert cache_dir.root().name == "cache"
 
 
 def test_a_page_with_several_interpolated_fields_is_checked() -> None:

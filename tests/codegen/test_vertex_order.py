@@ -10,8 +10,8 @@ import pytest
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import VERTEX_ORDER, Target, TargetError
+from softehl.codegen.elements.cells import ELEMENTS, Element
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements.cells import ELEMENTS, Element
 from softehl.codegen.language.model import Model
 
 NOT_NODAL = ("quad8", "hex20")

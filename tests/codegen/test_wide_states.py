@@ -17,7 +17,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 
 from softehl.codegen import pipeline
-from softehl.codegen.tools import build, product
+from softehl.codegen.tools import build, output_files
 from softehl.runtime.kernels.kernel import load_kernel
 from tests.codegen.random_models import OutsideError, Recipe, recipes
 from tests.codegen.test_properties import error, expected
@@ -61,7 +61,7 @@ def test_random_pages_are_right_far_from_rest() -> None:
     folder = Path(tempfile.mkdtemp(prefix="wide_states_"))
     pages = {f"wide_{k}": recipe for k, recipe in enumerate(drawn(PAGES))}
     models = [recipe.definition(name) for name, recipe in pages.items()]
-    for name, text in product.files([pipeline.compile_model(d) for d in models]).items():
+    for name, text in output_files.files([pipeline.compile_model(d) for d in models]).items():
         (folder / name).write_text(text, encoding="utf-8")
     build.build(folder, extra=(*build.STRICT, "-O0"))
     wrong, compared, overflows = {}, 0, 0

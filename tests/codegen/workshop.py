@@ -12,13 +12,13 @@ import numpy as np
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Task
-from softehl.codegen.derive import variants
-from softehl.codegen.derive.outputs import Slot
-from softehl.codegen.graph.evaluate import State, evaluate
+from softehl.codegen.derive import task_outputs
+from softehl.codegen.derive.output_entries import Slot
+from softehl.codegen.graph.evaluation import State, evaluate
 from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.tools import build, product
-from softehl.codegen.tools.oracle import Oracle
+from softehl.codegen.tools import build, output_files
+from softehl.codegen.verify.graph_oracle import Oracle
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
 Number = Any
@@ -27,7 +27,7 @@ DIGITS = 50
 
 
 def inputs(*values: Number) -> dict[tuple[str, int], Number]:
-    """Values of `dofs[0]`, `dofs[1]`, ... for `codegen.graph.evaluate.evaluate`."""
+    """Values of `dofs[0]`, `dofs[1]`, ... for `codegen.graph.evaluation.evaluate`."""
     return {("dofs", k): v for k, v in enumerate(values)}
 
 
@@ -77,7 +77,7 @@ def linearised(d: Definition, state: State) -> tuple[list[Number], list[list[Num
     with mpmath.workdps(90):
         R = [mpmath.mpf(0)] * ndof
         K = [[mpmath.mpf(0)] * ndof for _ in range(ndof)]
-        for x in variants.outputs(d, Task.TANGENT):
+        for x in task_outputs.outputs(d, Task.TANGENT):
             for i, row in _shapes(d, x.row, state):
                 if x.column is None:
                     R[i] += _contracted(d, x.node, state, [row])
@@ -113,7 +113,7 @@ def _contracted(d: Definition, node: Node, state: State, shapes: Sequence[Shape]
 def write(d: Definition, directory: Path) -> None:
     """All files of one model, as `softehl generate` writes them."""
     directory.mkdir(exist_ok=True)
-    for name, text in product.files([pipeline.compile_model(d)]).items():
+    for name, text in output_files.files([pipeline.compile_model(d)]).items():
         (directory / name).write_text(text, encoding="utf-8")
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from softehl import Mesh, Study
 from softehl.codegen.language.fields import Fields
-from softehl.codegen.language.pages import Page
+from softehl.codegen.language.weak_form import Page
 from softehl.runtime.discretisation.loads import DeadLoad, Pressure
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError

@@ -10,7 +10,7 @@ import pytest
 import softehl
 from softehl import Mesh
 from softehl.codegen.language.fields import Fields
-from softehl.codegen.language.pages import Page
+from softehl.codegen.language.weak_form import Page
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation import matrix_free_products
 from softehl.runtime.discretisation.assembly import Assembler

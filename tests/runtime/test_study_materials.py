@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 import softehl
-from softehl.codegen.language.complaints import ModelError
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.runtime.arrays import Array

@@ -15,7 +15,7 @@ import pytest
 import sympy as sp
 
 from softehl import Definition, Mesh, Model, Study, quadrature
-from softehl.codegen.language.complaints import ModelError
+from softehl.codegen.language.errors import ModelError
 from softehl.runtime.solve.solution import NotConverged
 from tests.runtime import solid_page as pages
 

@@ -14,9 +14,9 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 
 import softehl
+from softehl.codegen.elements.cells import element
 from softehl.codegen.language import kinematics
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements.cells import element
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.language.model import Model
 from tests.codegen.random_models import expressions

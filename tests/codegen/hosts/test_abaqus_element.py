@@ -13,13 +13,13 @@ from hypothesis import given
 
 import softehl
 from softehl.codegen.abi import TargetError
-from softehl.codegen.hosts import patch
-from softehl.codegen.hosts.interface import Interface
+from softehl.codegen.elements import quadrature
+from softehl.codegen.hosts import patch_mesh
+from softehl.codegen.hosts.element_interface import Interface
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import hosts, user
+from softehl.codegen.tools import host_files, model_loader
 from tests.codegen.hosts.random_pages import FEW, A, B, page, pages
 from tests.codegen.hosts.workshop import errors, folder, made
 
@@ -30,7 +30,7 @@ needs_fortran = pytest.mark.skipif(shutil.which("gfortran") is None, reason="no 
 
 
 def definition(path: Path) -> Definition:
-    (found,) = user.definitions(path)
+    (found,) = model_loader.definitions(path)
     return found
 
 
@@ -45,7 +45,7 @@ def patched(place: Path, pull: float, increments: int = 4, **properties: float) 
     lines[1 + nodes + cells] = " ".join(words)
     for n, line in enumerate(lines):
         equation, *rest = line.split()
-        if n > nodes + cells + 3 and rest == [repr(patch.PULL)]:
+        if n > nodes + cells + 3 and rest == [repr(patch_mesh.PULL)]:
             lines[n] = f"{equation} {pull!r}"
     (place / "patch.txt").write_text("\n".join(lines) + "\n")
 
@@ -54,7 +54,7 @@ def study(d: Definition, pull: float, **settings: Any) -> softehl.Study:
     """The same patch."""
     kind = Interface.of(d, "abaqus").cell
     assert kind is not None
-    mesh = patch.patch(kind)
+    mesh = patch_mesh.patch(kind)
     cells = {kind.name: np.array(mesh.cells)}
     problem = softehl.Study(softehl.Mesh(np.array(mesh.points), cells))
     problem.add("body", d, **settings)
@@ -67,7 +67,7 @@ def off(d: Definition, result: softehl.Result, place: Path) -> float:
     """Largest difference between the solutions, by the largest value."""
     seen = Interface.of(d, "abaqus")
     assert seen.cell is not None
-    number = patch.numbers(seen, patch.patch(seen.cell))
+    number = patch_mesh.numbers(seen, patch_mesh.patch(seen.cell))
     found = np.loadtxt(place / "solution.txt")[: len(number)]
     values = [result.values(f.name) for f in seen.nodal]
     expected = np.array([values[k][node] for node, k in number])
@@ -159,7 +159,7 @@ def test_an_unknown_of_the_element_is_refused() -> None:
     a = m.unknown("a")
     m.potential((u[1] - u[0] + a) ** 2 / (X[1] - X[0]) + a**2)
     with pytest.raises(TargetError, match=r"unknowns of the element alone \(a\): target abaqus"):
-        hosts.files(m.finish(), "abaqus")
+        host_files.files(m.finish(), "abaqus")
 
 
 @needs_fortran
@@ -178,7 +178,9 @@ def test_a_property_that_the_page_does_not_allow_ends_the_analysis(tmp_path: Pat
 
 
 def test_the_deck_has_what_the_page_needs() -> None:
-    deck = hosts.files(page("tri6", A**2, A**3, conservative=False), "abaqus")["random_tri6.inp"]
+    deck = host_files.files(page("tri6", A**2, A**3, conservative=False), "abaqus")[
+        "random_tri6.inp"
+    ]
     assert "TYPE=U1, NODES=6, COORDINATES=2, PROPERTIES=2, VARIABLES=9, UNSYMM\n" in deck
     assert "UNSYMM\n11, 12\n4, 11\n*ELEMENT" in deck
     assert "*HEAT TRANSFER" in deck

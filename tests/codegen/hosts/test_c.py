@@ -11,11 +11,11 @@ from hypothesis import given
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import TargetError
-from softehl.codegen.hosts.all import ELEMENTS
-from softehl.codegen.hosts.interface import Before, Given, Interface, Timed
+from softehl.codegen.hosts.element_interface import Before, Given, Interface, Timed
+from softehl.codegen.hosts.registry import ELEMENTS
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import cli, hosts
+from softehl.codegen.tools import cli, host_files
 from tests.codegen import field_pages
 from tests.codegen.hosts.random_pages import FEW, A, K, page, pages
 from tests.codegen.hosts.workshop import errors, folder, made, off_python
@@ -113,9 +113,9 @@ def test_who_fills_the_arguments_of_a_page() -> None:
 
 
 def test_rates_come_from_the_step_in_time() -> None:
-    from softehl.codegen.tools import user
+    from softehl.codegen.tools import model_loader
 
-    (heat,) = user.definitions(HEAT)
+    (heat,) = model_loader.definitions(HEAT)
     seen = Interface.of(heat, "c")
     assert seen.parameters == [Given(0), Given(1), Timed("rate")]
     assert seen.data == [Before(0, rate=True), Before(1, rate=True)]
@@ -125,7 +125,7 @@ def test_rates_come_from_the_step_in_time() -> None:
 def test_an_interpolated_field_is_refused(host: str) -> None:
     said = rf"film interpolates p .* target {host} needs a fixed number"
     with pytest.raises(TargetError, match=said):
-        hosts.files(ALL["film"](), host)
+        host_files.files(ALL["film"](), host)
 
 
 def test_a_page_and_a_folder_are_needed(capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,10 +12,10 @@ import pytest
 import sympy as sp
 
 import softehl
-from softehl.codegen.hosts import calculix, patch
-from softehl.codegen.hosts.material import Measure, response, solid
-from softehl.codegen.hosts.solid import PULL, TWIST
-from softehl.codegen.language.elements import cells
+from softehl.codegen.elements import cells
+from softehl.codegen.hosts import calculix, patch_mesh
+from softehl.codegen.hosts.material_common import PULL, TWIST
+from softehl.codegen.hosts.material_response import Measure, response, solid
 from softehl.codegen.language.material import Material
 from softehl.runtime.arrays import Array
 from tests.codegen.hosts.test_material_history import creeping
@@ -71,7 +71,7 @@ def test_history_in_calculix_is_that_of_a_study(tmp_path: Path) -> None:
     found, iterations = run(place, "creeping", direct)
     assert len(iterations) == 4
     d = solid(creeping, "hex8")
-    mesh = patch.patch(cells.element("hex8"), 2)
+    mesh = patch_mesh.patch(cells.element("hex8"), 2)
     points = np.array(mesh.points)
     study = softehl.Study(softehl.Mesh(points, {"hex8": np.array(mesh.cells)}))
     study.add("body", d, **values)  # type: ignore[arg-type]

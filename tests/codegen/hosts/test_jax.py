@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 
 from softehl.codegen.abi import TargetError
+from softehl.codegen.elements import quadrature
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import hosts, user
+from softehl.codegen.tools import host_files, model_loader
 from tests.codegen.hosts.random_pages import FEW, A, B, K, page, pages
 from tests.codegen.hosts.workshop import errors, folder, made
 
@@ -64,7 +64,7 @@ def test_the_test_of_a_folder_sees_a_fault(name: str, old: str, new: str, tmp_pa
 @needs_jax
 def test_a_solution_has_the_derivatives_of_its_adjoint(tmp_path: Path) -> None:
     """The folder's last check: by held values, forces and parameters, against differences."""
-    (d,) = user.definitions(ROOT / "docs" / "models" / "neo_hooke.py")
+    (d,) = model_loader.definitions(ROOT / "docs" / "models" / "neo_hooke.py")
     done = made(folder(d, "jax", tmp_path), PYTHON=PYTHON)
     assert "a solution by all, differences" in done.stdout, done.stderr
     assert errors(done.stdout)[-1] < 1e-8
@@ -76,11 +76,11 @@ def test_a_page_without_a_tangent_is_refused() -> None:
     m.potential(u**2)
     m.offer(tasks=["residual"])
     with pytest.raises(TargetError, match="force offers no task tangent, which target jax needs"):
-        hosts.files(m.finish(), "jax")
+        host_files.files(m.finish(), "jax")
 
 
 def test_the_module_names_what_the_page_has() -> None:
-    texts = hosts.files(page("line2", A**2 * K, A * B, conservative=True), "jax")
+    texts = host_files.files(page("line2", A**2 * K, A * B, conservative=True), "jax")
     module = texts["random_line2_jax.py"]
     compile(module, "random_line2_jax.py", "exec")
     assert "PARAMETERS = {'k': 'a parameter'}" in module

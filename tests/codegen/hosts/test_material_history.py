@@ -11,17 +11,17 @@ import pytest
 
 import softehl
 from softehl.codegen.abi import TargetError
-from softehl.codegen.hosts import patch
-from softehl.codegen.hosts.interface import Interface
-from softehl.codegen.hosts.material import solid
+from softehl.codegen.hosts import patch_mesh
+from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.material_response import solid
 from softehl.codegen.language.material import Law, Material
-from softehl.codegen.tools import hosts, user
+from softehl.codegen.tools import host_files, model_loader
 from softehl.runtime.arrays import Array
 from tests.codegen.hosts.materials import j2
 from tests.codegen.hosts.workshop import errors, folder, made
 
 ROOT = Path(__file__).parents[3]
-(_found,) = user.pages(ROOT / "docs" / "models" / "creep_law.py")
+(_found,) = model_loader.pages(ROOT / "docs" / "models" / "creep_law.py")
 assert isinstance(_found, Law)
 creeping: Law = _found
 VALUES = {
@@ -45,7 +45,7 @@ def by_study(law: Law) -> Array:
     d = solid(law)
     kind = Interface.of(d, "abaqus").cell
     assert kind is not None
-    mesh = patch.patch(kind)
+    mesh = patch_mesh.patch(kind)
     study = softehl.Study(softehl.Mesh(np.array(mesh.points), {kind.name: np.array(mesh.cells)}))
     study.add("body", d, **VALUES[law.name])  # type: ignore[arg-type]
     study.fix(np.array(mesh.left), u_x=0, u_y=0, u_z=0)
@@ -120,4 +120,4 @@ def sliding(m: Material) -> None:
 
 def test_calculix_refuses_a_modulus_that_is_not_symmetric() -> None:
     with pytest.raises(TargetError, match="the modulus of sliding is not symmetric at a random"):
-        hosts.files(sliding, "calculix")
+        host_files.files(sliding, "calculix")

@@ -15,15 +15,15 @@ from hypothesis import given
 
 import softehl
 from softehl.codegen.abi import TargetError
-from softehl.codegen.graph.evaluate import State, Walk
-from softehl.codegen.hosts.material import VOIGT, Measure, Response, response, solid
-from softehl.codegen.language.complaints import ModelError
-from softehl.codegen.language.elements import quadrature
+from softehl.codegen.elements import quadrature
+from softehl.codegen.graph.evaluation import State, Walk
+from softehl.codegen.hosts.material_response import VOIGT, Measure, Response, response, solid
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import cli, hosts
+from softehl.codegen.tools import cli, host_files
+from softehl.codegen.tools.model_loader import definitions
 from softehl.codegen.tools.model_text import ModelFileError
-from softehl.codegen.tools.user import definitions
 from softehl.runtime.arrays import Array
 from tests.codegen.hosts.materials import fluid, hooke, neo, ogden_1, turned
 from tests.codegen.hosts.random_pages import FEW, laws
@@ -169,19 +169,19 @@ def test_a_law_in_a_page_of_a_study() -> None:
 
 def test_an_energy_that_changes_with_a_rotation_is_refused() -> None:
     with pytest.raises(TargetError, match="turned is not symmetric: its energy must not change"):
-        hosts.files(turned, "abaqus")
+        host_files.files(turned, "abaqus")
 
 
 def test_calculix_needs_an_energy() -> None:
     with pytest.raises(TargetError, match="the modulus of fluid is not symmetric at a random"):
-        hosts.files(fluid, "calculix")
+        host_files.files(fluid, "calculix")
 
 
 def test_a_host_takes_what_it_can() -> None:
     with pytest.raises(TargetError, match="neo is a material: target ngsolve takes elements"):
-        hosts.files(neo, "ngsolve")
+        host_files.files(neo, "ngsolve")
     with pytest.raises(TargetError, match="neo_tet4 is an element: target calculix takes mat"):
-        hosts.files(solid(neo), "calculix")
+        host_files.files(solid(neo), "calculix")
 
 
 def test_a_file_of_materials(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 
 from softehl.codegen.abi import TargetError
+from softehl.codegen.elements.cells import element
 from softehl.codegen.language import kinematics
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements.cells import element
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import hosts, user
+from softehl.codegen.tools import host_files, model_loader
 from tests.codegen.hosts.random_pages import FEW, A, B, page, pages
 from tests.codegen.hosts.workshop import errors, folder, made, off_python
 
@@ -74,18 +74,18 @@ def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -
 
 
 def test_the_space_has_a_function_for_each_name() -> None:
-    (d,) = user.definitions(ROOT / "docs" / "models" / "neo_hooke.py")
-    assert "space = ng.VectorH1(mesh, order=1)\n" in hosts.files(d, "ngsolve")["NOTES.md"]
-    notes = hosts.files(field("tri6"), "ngsolve")["NOTES.md"]
+    (d,) = model_loader.definitions(ROOT / "docs" / "models" / "neo_hooke.py")
+    assert "space = ng.VectorH1(mesh, order=1)\n" in host_files.files(d, "ngsolve")["NOTES.md"]
+    notes = host_files.files(field("tri6"), "ngsolve")["NOTES.md"]
     assert "space = ng.H1(mesh, order=2) * ng.H1(mesh, order=1)\n" in notes
     assert "ng.BilinearForm(space)\n" in notes
 
 
 def test_what_ngsolve_cannot_hold_is_refused() -> None:
     with pytest.raises(TargetError, match="field_quad8 has 8 nodes in 2 coordinates: target ngs"):
-        hosts.files(field("quad8"), "ngsolve")
+        host_files.files(field("quad8"), "ngsolve")
     with pytest.raises(TargetError, match="random_tri3 has data of points, which target ngsolve"):
-        hosts.files(page("tri3", A**2, A * B, conservative=True), "ngsolve")
-    (heat,) = user.definitions(ROOT / "docs" / "models" / "heat.py")
+        host_files.files(page("tri3", A**2, A * B, conservative=True), "ngsolve")
+    (heat,) = model_loader.definitions(ROOT / "docs" / "models" / "heat.py")
     with pytest.raises(TargetError, match="heat has values of a step in time, which target ngs"):
-        hosts.files(heat, "ngsolve")
+        host_files.files(heat, "ngsolve")

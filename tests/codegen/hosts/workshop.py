@@ -13,7 +13,8 @@ import numpy as np
 
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.material import Law
-from softehl.codegen.tools import hosts, samples
+from softehl.codegen.tools import host_files
+from softehl.codegen.verify import random_states
 from tests.codegen.workshop import compiled
 
 _ERROR = re.compile(r"(\d\.\de[-+]\d\d)  (?:ok|FAILED)$", re.MULTILINE | re.IGNORECASE)
@@ -21,13 +22,13 @@ _ERROR = re.compile(r"(\d\.\de[-+]\d\d)  (?:ok|FAILED)$", re.MULTILINE | re.IGNO
 
 def folder(d: Definition | Law, host: str, place: Path) -> Path:
     """The folder of a page for a host."""
-    hosts.write(place, _of_law(d, host) if isinstance(d, Law) else hosts.files(d, host))
+    host_files.write(place, _of_law(d, host) if isinstance(d, Law) else host_files.files(d, host))
     return place
 
 
 @cache
 def _of_law(law: Law, host: str) -> dict[str, str]:
-    return hosts.files(law, host)
+    return host_files.files(law, host)
 
 
 def made(place: Path, target: str = "test", **settings: str) -> subprocess.CompletedProcess[str]:
@@ -51,7 +52,7 @@ def errors(printed: str) -> list[float]:
 
 def off_python(d: Definition, place: Path) -> float:
     """Largest difference of residual and tangent in libNAME.so from those of the Python kernel."""
-    states = samples.admissible(d, 3)
+    states = random_states.admissible(d, 3)
     X, u = (np.array([getattr(s, k) for s in states]) for k in ("coordinates", "dofs"))
     constants, points = (np.array([getattr(s, k) for s in states]) for k in ("data", "point_data"))
     p, n, size = np.array(states[0].parameters), len(u), len(d.unknowns)

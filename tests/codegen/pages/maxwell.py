@@ -4,9 +4,9 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.elements import quadrature, shapes
 from softehl.codegen.language import kinematics as kin
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
 
 

@@ -2,8 +2,8 @@
 
 import sympy as sp
 
+from softehl.codegen.elements import quadrature
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 
 

@@ -1,8 +1,8 @@
 """Rubbers: parameters of a material, its kernels, its shear modulus and its stable stretches.
 
-The energies are in `codegen/language/materials.py`. Each has a kernel of the solid, and one of a
-sheet (`codegen/models/sheet.py`), an incompressible unit volume at principal logarithmic strains.
-Stresses of tests, moduli and stability come from the sheet.
+The energies are in `codegen/language/energies.py`. Each has a kernel of the solid, and one of a
+sheet (`codegen/models/biaxial_sheet.py`), an incompressible unit volume at principal logarithmic
+strains. Stresses of tests, moduli and stability come from the sheet.
 """
 
 from __future__ import annotations

@@ -1,0 +1,175 @@
+"""From a model's potential to the outputs of each task."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+from softehl.codegen.abi import AT_POINTS, Task, derivative_task
+from softehl.codegen.derive import invariant_chain_rule
+from softehl.codegen.derive.multilevel_chain_rule import Linearisation
+from softehl.codegen.derive.output_entries import Entry, Slot
+from softehl.codegen.derive.potential_structure import Structure, found_in
+from softehl.codegen.graph.differentiation import directional, gradient
+from softehl.codegen.graph.graph import Input, Node
+from softehl.codegen.graph.guarded_products import Certain
+from softehl.codegen.graph.traversal import reachable
+from softehl.codegen.language.definition import Definition
+
+SMALL = 100
+"""Values of a potential so simple that its interfaces may cost more than they save."""
+
+
+def tasks(d: Definition) -> list[str]:
+    """Tasks that a model offers: those it chose; else all, an energy only for a potential."""
+    offered: list[str] = [Task.RESIDUAL, Task.TANGENT]
+    if d.conservative:
+        offered.insert(0, Task.ENERGY)
+    if d.fields:
+        offered.append(Task.FIELDS)
+    if d.product:
+        offered.append(Task.PRODUCT)
+    if d.tasks is not None:
+        offered = [t for t in offered if t in d.tasks]
+    asked = {Task.PSEUDO_LOAD: d.pseudo_load, Task.FIELDS_RATE: d.fields_rate}
+    offered += [task for task, wanted in asked.items() if wanted]
+    return offered + [derivative_task(name) for name, _ in d.derivatives]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The outputs of a task by one chain rule, which has a name."""
+
+    rule: str
+    entries: list[Entry]
+
+
+def outputs(d: Definition, task: str) -> list[Entry]:
+    """Output nodes of a task, before any pass: the first of its `variants`."""
+    return next(variants(d, task, found_in(d))).entries
+
+
+def differentiated(task: str) -> bool:
+    """False for what the page writes down itself, and for the rates of it."""
+    return task not in (Task.ENERGY, *AT_POINTS)
+
+
+def variants(d: Definition, task: str, found: Structure | None) -> Iterator[Variant]:
+    """The outputs of a task by different chain rules: passes will tell which is the cheapest."""
+    if task == Task.FIELDS_RATE:
+        values = [Entry(Slot(False, k), None, n) for k, (_, n) in enumerate(d.fields)]
+        yield Variant("along a variation", _rates(d, task, values))
+    elif not differentiated(task):
+        nodes = [d.potential] if task == Task.ENERGY else [n for _, n in d.fields]
+        yield Variant(
+            "none, the page writes it down",
+            [Entry(Slot(False, k), None, n) for k, n in enumerate(nodes)],
+        )
+    elif task in (Task.RESIDUAL, Task.TANGENT):
+        yield from _rules(d, task, found)
+    elif task == Task.PSEUDO_LOAD:
+        for rule in _rules(d, Task.RESIDUAL, found):
+            yield Variant(f"along a variation, {rule.rule}", _rates(d, task, rule.entries))
+    else:
+        residual = next(_rules(d, Task.RESIDUAL, found))
+        yield Variant(f"along one direction, {residual.rule}", _rates(d, task, residual.entries))
+
+
+def _rules(d: Definition, task: str, found: Structure | None) -> Iterator[Variant]:
+    if found is not None:
+        ways = {
+            "level by level": invariant_chain_rule.by_levels(d, found),
+            "by slopes of what the potential sees": invariant_chain_rule.by_slopes(d, found),
+        }
+        for rule, way in ways.items():
+            yield Variant(rule, way.residual() + (way.tangent() if task == Task.TANGENT else []))
+    if found is None or len(reachable([d.potential])) <= SMALL:
+        yield Variant("through the values that the page names", _plain(d, task))
+
+
+def _plain(d: Definition, task: str) -> list[Entry]:
+    """Reverse mode, and forward over it through the interfaces that the model names."""
+    adjoint = gradient(d.graph, d.potential, d.directions, constant=d.constant, given=d.given)
+    slots = _slots(d)
+    rows = [Entry(s, None, adjoint[u]) for s, u in zip(slots, d.directions, strict=True)]
+    return rows + (_tangent(d, rows, slots, adjoint) if task == Task.TANGENT else [])
+
+
+def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
+    """The derivative of the residual `rows` along `direction` or with respect to one argument."""
+    g = d.graph
+    if task == Task.PRODUCT:
+        seeds = moved_unknowns(d, 0)
+    elif task == Task.PSEUDO_LOAD:
+        seeds = moved_arguments(d)
+    elif task == Task.FIELDS_RATE:
+        first = d.coordinate_width + len(d.data) + len(d.parameters)
+        seeds = {**moved_arguments(d), **moved_unknowns(d, first)}
+    else:
+        by_task = {derivative_task(name): node for name, node in d.derivatives}
+        seeds = {by_task[task]: g.one}
+    rates = directional(g, [x.node for x in rows], seeds, d.given)
+    return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
+
+
+def moved_unknowns(d: Definition, first: int) -> dict[Node, Node]:
+    """Unknowns that move along `direction`, where theirs begin at the entry `first`."""
+    array = {"dofs": ("direction", first), "interpolated": ("interpolated direction", 0)}
+    seeds = {}
+    for u in d.directions:
+        assert isinstance(u.payload, Input)
+        name, offset = array[u.payload.array]
+        seeds[u] = d.graph.input(name, offset + u.payload.index, varying=u.varying)
+    return seeds
+
+
+def moved_arguments(d: Definition) -> dict[Node, Node]:
+    """Coordinates, data and parameters that move along `direction`, in this order, and point data
+    that move as the model says.
+    """
+    widths = {
+        "coordinates": d.coordinate_width,
+        "data": len(d.data),
+        "parameters": len(d.parameters),
+    }
+    places = ((array, k) for array, width in widths.items() for k in range(width))
+    g = d.graph
+    seeds = {g.input(*place): g.input("direction", n) for n, place in enumerate(places)}
+    half = len(d.point_data) // 2 if d.point_rates else 0
+    for k, varying in product(range(half), (False, True)):
+        value = g.input("point data", k, varying=varying)
+        seeds[value] = g.input("point data", half + k, varying=varying)
+    return seeds
+
+
+def _slots(d: Definition) -> list[Slot]:
+    direct = len(d.unknowns)
+    return [Slot(u.varying, k - direct if u.varying else k) for k, u in enumerate(d.directions)]
+
+
+def _tangent(
+    d: Definition, rows: list[Entry], slots: list[Slot], adjoint: dict[Node, Node]
+) -> list[Entry]:
+    interface = [z for z in d.interface if z.varying]
+    mirror = {adjoint[z]: z for z in interface if z in adjoint} if d.conservative else {}
+    forward = Linearisation(
+        d.graph,
+        d.directions,
+        d.interface,
+        symmetric=mirror,
+        given=d.given,
+        certain=Certain([d.potential]),
+    )
+    entries: dict[tuple[int, int], Node] = {}
+    for i, row in enumerate(rows):
+        for j in range(len(slots)):
+            if d.conservative and j < i and not d.interpolated:
+                entries[i, j] = entries[j, i]
+            else:
+                entries[i, j] = forward.derivative(row.node, j)
+    return [
+        Entry(slots[i], slots[j], n)
+        for (i, j), n in entries.items()
+        if not (slots[i].basis or slots[j].basis) or n is not d.graph.zero
+    ]

@@ -1,0 +1,1 @@
+"""Elements: reference cells, shape functions and quadrature rules, exact until printed."""

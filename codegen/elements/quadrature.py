@@ -1,0 +1,215 @@
+"""Default quadrature rules of the models, exact until they are printed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from itertools import product
+from typing import Any
+
+import sympy as sp
+
+from softehl.codegen.graph.prime_field import close_rational
+
+_DIGITS = 100
+"""Of the points that have no short exact form."""
+
+
+@dataclass(frozen=True)
+class QuadratureRule:
+    """Points and weights of a reference cell, exact.
+
+    Attributes
+    ----------
+    dimension : int
+        Dimension of the cell.
+    points : tuple of tuple of Expr
+        Coordinates of each point.
+    weights : tuple of Expr
+        Weight of each point.
+    """
+
+    dimension: int
+    points: tuple[tuple[sp.Expr, ...], ...]
+    weights: tuple[sp.Expr, ...]
+
+    def __repr__(self) -> str:
+        """Summary in one line."""
+        return f"<QuadratureRule: {len(self.weights)} points in {self.dimension}-D>"
+
+    def rows(self) -> list[list[Fraction]]:
+        """Return the rule in rational numbers.
+
+        Returns
+        -------
+        list of list of Fraction
+            (coordinates, weight) of each point, to 60 digits or more.
+        """
+        pairs = zip(self.points, self.weights, strict=True)
+        return [[close_rational(x) for x in (*p, w)] for p, w in pairs]
+
+
+@dataclass(frozen=True)
+class Region:
+    """A reference cell: its name, where it is, its measure, and a rule for it."""
+
+    name: str
+    measure: sp.Rational
+    rule: str
+
+    def fits(self, rule: QuadratureRule) -> bool:
+        """True if all points lie in it and the weights sum to its measure."""
+        points = [[float(x) for x in p] for p in rule.points]
+        inside = all(self._holds(p) for p in points)
+        return inside and abs(sum(map(float, rule.weights)) - float(self.measure)) < _SLACK
+
+    def _holds(self, p: list[float]) -> bool:
+        flat = {"triangle": 2, "tetrahedron": 3, "wedge": 2}.get(self.name, 0)
+        simplex, rest = p[:flat], p[flat:]
+        within = min([0.0, *simplex]) >= -_SLACK and sum(simplex) <= 1 + _SLACK
+        return within and all(abs(x) <= 1 + _SLACK for x in rest)
+
+
+_SLACK = 1e-9
+"""Of points and weights as doubles."""
+REGIONS = {
+    1: (Region("line", sp.Integer(2), "gauss(2, 1)"),),
+    2: (
+        Region("square", sp.Integer(4), "gauss(2, 2)"),
+        Region("triangle", sp.Rational(1, 2), "triangle(2)"),
+    ),
+    3: (
+        Region("cube", sp.Integer(8), "gauss(2, 3)"),
+        Region("tetrahedron", sp.Rational(1, 6), "tetrahedron(2)"),
+        Region("wedge", sp.Integer(1), "wedge(2)"),
+    ),
+}
+"""The reference cells of every dimension."""
+
+
+def point_rule() -> QuadratureRule:
+    """The rule of a model without an integral: one point, no coordinates, weight one."""
+    return QuadratureRule(0, ((),), (sp.Integer(1),))
+
+
+def gauss(order: int, dimension: int) -> QuadratureRule:
+    """Gauss-Legendre product rule with `order` points in each direction on [-1, 1].
+
+    Any order of at least 1: points are exact up to 3, beyond that rational to 100 digits.
+    """
+    _require("gauss", "order", order)
+    if dimension not in (1, 2, 3):
+        raise ValueError(f"gauss({order}, {dimension}): the dimension is 1, 2 or 3")
+    grid = list(product(_line(order), repeat=dimension))
+    points = tuple(tuple(x for x, _ in entry) for entry in grid)
+    return QuadratureRule(dimension, points, tuple(sp.prod([w for _, w in e]) for e in grid))
+
+
+def lobatto(order: int) -> tuple[Any, ...]:
+    """Points of Gauss and Lobatto inside (-1, 1), rising: with both ends as many as nodes of a line
+    of this order, 1 to 6; rational to 100 digits where they are no rational numbers.
+    """
+    root = sp.sqrt
+    squares = {  # of the positive ones, roots of the derivative of Legendre's polynomial
+        1: [],
+        2: [],
+        3: [sp.Rational(1, 5)],
+        4: [sp.Rational(3, 7)],
+        5: [(7 - 2 * root(7)) / 21, (7 + 2 * root(7)) / 21],
+        6: [(15 - 2 * root(15)) / 33, (15 + 2 * root(15)) / 33],
+    }
+    if order not in squares:
+        raise ValueError(f"lobatto: order = {order!r}; allowed is 1 to 6")
+    right = [_rounded(sp.N(root(s), _DIGITS + 20)) for s in squares[order]]
+    middle = [] if order % 2 else [sp.Integer(0)]
+    return (*(-x for x in reversed(right)), *middle, *right)
+
+
+def triangle(degree: int) -> QuadratureRule:
+    """Rule on the unit triangle for polynomials of a degree, at least.
+
+    Symmetric of 1 and 3 points up to degree 2, beyond that Gauss and Jacobi with collapsed sides.
+    """
+    _require("triangle", "degree", degree)
+    third, sixth = sp.Rational(1, 3), sp.Rational(1, 6)
+    if degree == 1:
+        return QuadratureRule(2, ((third, third),), (sp.Rational(1, 2),))
+    if degree == 2:
+        far = sp.Rational(2, 3)
+        return QuadratureRule(2, ((sixth, sixth), (far, sixth), (sixth, far)), (sixth,) * 3)
+    return _collapsed(2, degree)
+
+
+def tetrahedron(degree: int) -> QuadratureRule:
+    """Rule on the unit tetrahedron for polynomials of a degree, at least.
+
+    Symmetric of 1 and 4 points up to degree 2, beyond that Gauss and Jacobi with collapsed sides.
+    """
+    _require("tetrahedron", "degree", degree)
+    if degree == 1:
+        return QuadratureRule(3, ((sp.Rational(1, 4),) * 3,), (sp.Rational(1, 6),))
+    if degree == 2:
+        near, far = (5 - sp.sqrt(5)) / 20, (5 + 3 * sp.sqrt(5)) / 20
+        points = ((near,) * 3, (far, near, near), (near, far, near), (near, near, far))
+        return QuadratureRule(3, points, (sp.Rational(1, 24),) * 4)
+    return _collapsed(3, degree)
+
+
+def wedge(degree: int) -> QuadratureRule:
+    """Rule on triangle x [-1, 1] for polynomials of a degree in each, at least."""
+    flat, line = triangle(degree), _line(degree // 2 + 1)
+    pairs = list(zip(flat.points, flat.weights, strict=True))
+    points = tuple((*p, x) for p, _ in pairs for x, _ in line)
+    return QuadratureRule(3, points, tuple(w * v for _, w in pairs for _, v in line))
+
+
+def _require(rule: str, what: str, value: object) -> None:
+    if type(value) is not int or value < 1:
+        raise ValueError(f"{rule}: {what} = {value!r}, must be a whole number of at least 1")
+
+
+def _line(order: int) -> tuple[tuple[Any, Any], ...]:
+    """Points and weights of Gauss and Legendre on [-1, 1]."""
+    if order == 1:
+        return ((sp.Integer(0), sp.Integer(2)),)
+    if order == 2:
+        return tuple((s / sp.sqrt(3), sp.Integer(1)) for s in (-1, 1))
+    if order == 3:
+        far, middle, side = sp.sqrt(sp.Rational(3, 5)), sp.Rational(8, 9), sp.Rational(5, 9)
+        return ((-far, side), (sp.Integer(0), middle), (far, side))
+    return _jacobi(order, 0)
+
+
+@cache
+def _jacobi(order: int, power: int) -> tuple[tuple[Any, Any], ...]:
+    """Points and weights for the weight (1 - x)^power on [-1, 1], as rational numbers."""
+    x = sp.Symbol("x")
+    polynomial = sp.Poly(sp.jacobi(order, power, 0, x), x)
+    slope = polynomial.diff(x)
+    pairs = []
+    for root in sorted(sp.nroots(polynomial, n=_DIGITS + 20, maxsteps=500)):
+        place = sp.Rational(str(root))
+        weight = 2 ** (power + 1) / ((1 - place**2) * slope.eval(place) ** 2)
+        pairs.append((place, _rounded(weight)))
+    return tuple((_rounded(place), weight) for place, weight in pairs)
+
+
+def _rounded(value: Any) -> Any:
+    return sp.Rational(round(value * 10**_DIGITS), 10**_DIGITS)
+
+
+def _collapsed(dimension: int, degree: int) -> QuadratureRule:
+    """A cube's rule of Gauss and Jacobi, collapsed to the unit simplex."""
+    order = degree // 2 + 1
+    factors = [
+        [((1 + x) / 2, w / 2 ** (power + 1)) for x, w in _jacobi(order, power)]
+        for power in range(dimension)
+    ]
+    points, weights = [], []
+    for entry in product(*factors):
+        place = [x for x, _ in entry]
+        shrunk = [x * sp.prod([1 - y for y in place[d + 1 :]]) for d, x in enumerate(place)]
+        points.append(tuple(shrunk))
+        weights.append(sp.prod([w for _, w in entry]))
+    return QuadratureRule(dimension, tuple(points), tuple(weights))

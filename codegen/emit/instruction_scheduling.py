@@ -1,0 +1,244 @@
+"""The order of straight-line code: few values live, and no waiting for results under way.
+
+A C compiler keeps long straight-line code in the order in which it is written, and spills what
+does not fit its registers.  `arranged` chooses the order by list scheduling over a simulated
+register file: of everything that is ready, the piece comes next which fetches the fewest operands
+from memory, uses the most of them for the last time, and waits least for results.
+
+Sums stay open while this goes on: any term may be added next, as a multiply-add when it is a
+product that nothing else uses, so that a term is consumed where it arises.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, OrderedDict
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from heapq import heappop, heappush
+
+from softehl.codegen.graph.graph import FREE, Graph, Node, Op
+from softehl.codegen.graph.traversal import reachable
+from softehl.codegen.optimise.common_sums import first_difference
+
+REGISTERS = 16
+"""Values that the simulated file holds: those of AVX2."""
+ADDITIONS = (Op.ADD, Op.SUB)
+LATENCY = {Op.RECIP: 26, Op.RCBRT: 60, Op.CBRT: 60, Op.SQRT: 40, Op.LOG: 100, Op.EXP: 100}
+"""Half cycles (two pieces start in a cycle) until a result is there."""
+USUAL_LATENCY = 8
+LONGEST_WAIT = 12
+CANDIDATES = 1_000_000
+"""Pieces that are compared in all: in very long code only those written first are candidates."""
+
+# What a piece costs, in operands fetched: measured on the solids of `models`.
+LAST_USE = -1.0
+WAITING = 0.3
+OPENING = 0.3
+PARTIAL_SUM = 1.5
+FINISHING = -0.5
+DRIFT = 1.0
+
+
+@dataclass(eq=False)
+class _Sum:
+    """A sum with its terms still to be added; `partial` is what has been added so far."""
+
+    head: Node
+    left: int = 0
+    partial: Node | None = None
+    waiting: list[_Piece] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """One instruction: a value of its own, or one term (one or two factors) of a sum."""
+
+    node: Node
+    operands: tuple[Node, ...]
+    total: _Sum | None = None
+    sign: int = 1
+
+    @cached_property
+    def fetched(self) -> tuple[Node, ...]:
+        """Different operands that are not written into the instruction."""
+        return tuple(dict.fromkeys(a for a in self.operands if a.op not in (Op.CONST, Op.PI)))
+
+
+def arranged(
+    g: Graph,
+    roots: Sequence[Node],
+    inside: Collection[Node] | None = None,
+    computed: Collection[Node] = (),
+) -> tuple[list[Node], list[Node]]:
+    """Roots of the same values, and every value below them in the order of computation.
+
+    inside: values that are to be computed (None: all); what lies below others is known.
+    computed: values that are known besides.
+    """
+    pieces = _pieces(roots, inside)
+    run = _Scheduler(g, pieces, set(computed))
+    while run.ready:
+        run.step()
+    return [run.new.get(r, r) for r in roots], run.order
+
+
+def _pieces(roots: Sequence[Node], inside: Collection[Node] | None) -> list[_Piece]:
+    """Everything below the roots taken apart: sums into terms, products of one use into sums."""
+    within = None if inside is None else frozenset(inside)
+    below = reachable(roots, None if within is None else lambda n: n not in within)
+    nodes = [n for n in below if n.op not in FREE and (within is None or n in within)]
+    uses, user = Counter(roots), {}
+    for n in nodes:
+        uses.update(n.args)
+        user.update(dict.fromkeys(n.args, n))
+    kept, own = set(roots), set(nodes)
+
+    def inner(n: Node) -> bool:
+        alone = n in own and uses[n] == 1 and n not in kept and user[n].op in ADDITIONS
+        return alone and (n.op is Op.MUL or (n.op in ADDITIONS and not first_difference(n)))
+
+    def terms(total: _Sum) -> list[_Piece]:
+        out = []
+        stack = [(total.head, 1)]
+        while stack:
+            a, sign = stack.pop()
+            if a is total.head or (inner(a) and a.op is not Op.MUL):
+                first, second = a.args
+                stack += [(second, -sign if a.op is Op.SUB else sign), (first, sign)]
+            else:
+                out.append(_Piece(a, a.args if inner(a) else (a,), total, sign))
+        return out
+
+    pieces = []
+    for n in nodes:
+        if inner(n):
+            continue
+        if n.op in ADDITIONS:
+            total = _Sum(n)
+            added = terms(total)
+            total.left = len(added)
+            pieces += added
+        else:
+            pieces.append(_Piece(n, n.args))
+    return pieces
+
+
+@dataclass
+class _Scheduler:
+    g: Graph
+    pieces: list[_Piece]
+    printed: set[Node] = field(default_factory=set)
+    new: dict[Node, Node] = field(default_factory=dict)
+    order: list[Node] = field(default_factory=list)
+    ready: dict[_Piece, None] = field(default_factory=dict)
+    registers: OrderedDict[Node | _Sum, None] = field(default_factory=OrderedDict)
+    clock: int = 0
+
+    def __post_init__(self) -> None:
+        self._window = max(8, CANDIDATES // max(len(self.pieces), 1))
+        self._later: list[tuple[float, _Piece]] = []
+        own = {p.node if p.total is None else p.total.head for p in self.pieces}
+        self.printed.update(a for p in self.pieces for a in p.fetched if a not in own)
+        # how early the model's author, or the chain rule, wrote a value
+        ids = sorted(self.pieces, key=lambda p: p.node.id)
+        self._place = {p: k / len(ids) for k, p in enumerate(ids)}
+        self._arrival: dict[Node | _Sum, int] = {}
+        self._waiting: dict[Node, list[_Piece]] = {}
+        self._missing: dict[_Piece, int] = {}
+        self._uses: Counter[Node] = Counter()
+        for p in self.pieces:
+            self._uses.update(p.fetched)
+            missing = [a for a in p.fetched if a in own]
+            self._missing[p] = len(missing)
+            for a in missing:
+                self._waiting.setdefault(a, []).append(p)
+            if not missing:
+                self._offer(p)
+
+    def _offer(self, p: _Piece) -> None:
+        """A piece whose operands are known: ready, unless its sum must begin with another one."""
+        if p.total is not None and p.total.partial is None and p.sign < 0:
+            p.total.waiting.append(p)
+        elif len(self.ready) < self._window:
+            self.ready[p] = None
+        else:
+            heappush(self._later, (self._place[p], p))
+
+    def step(self) -> None:
+        """Take the cheapest piece that is ready."""
+        p = min(self.ready, key=lambda p: (self._cost(p), p.node.id))
+        del self.ready[p]
+        start = max([self.clock, *(self._arrival.get(a, 0) for a in p.operands)])
+        done, result = self._compute(p)
+        for a in p.fetched:
+            self._touch(a)
+            self._uses[a] -= 1
+            if not self._uses[a]:
+                self.registers.pop(a, None)
+        self._arrival[result] = start + LATENCY.get(p.node.op, USUAL_LATENCY)
+        self._touch(result)
+        self.clock += 1
+        for waiting in self._waiting.pop(done, []) if done is not None else []:
+            self._missing[waiting] -= 1
+            if not self._missing[waiting]:
+                self._offer(waiting)
+        while self._later and len(self.ready) < self._window:
+            self.ready[heappop(self._later)[1]] = None
+
+    def _cost(self, p: _Piece) -> float:
+        cost, arrival = DRIFT * self._place[p], self.clock
+        for a in p.fetched:
+            if a not in self.registers:
+                cost += 1.0
+            if self._uses[a] == 1:
+                cost += LAST_USE
+            arrival = max(arrival, self._arrival.get(a, 0))
+        if p.total is not None:
+            if p.total.partial is None:
+                cost += OPENING
+            else:
+                cost += PARTIAL_SUM * (p.total not in self.registers)
+                cost += FINISHING * (p.total.left == 1)
+                arrival = max(arrival, self._arrival.get(p.total, 0))
+        return cost + WAITING * min(arrival - self.clock, LONGEST_WAIT)
+
+    def _compute(self, p: _Piece) -> tuple[Node | None, Node | _Sum]:
+        """The value that is now known (None: a sum that is not complete), and what holds it."""
+        g, operands = self.g, [self.new.get(a, a) for a in p.operands]
+        if p.total is None:
+            n = self.new[p.node] = g.rebuild(p.node.op, operands, p.node.payload)
+            self._print(n)
+            return p.node, p.node
+        term = g.mul(*operands) if len(operands) == 2 else operands[0]
+        self._print(term)
+        total = p.total
+        if total.partial is None:
+            # A sum starts with a term of positive sign: there always is one.
+            total.partial = term
+            for waiting in total.waiting:
+                self._offer(waiting)
+        else:
+            total.partial = (g.add if p.sign > 0 else g.sub)(total.partial, term)
+            self._print(total.partial)
+        total.left -= 1
+        if total.left:
+            return None, total
+        self.registers.pop(total, None)
+        self.new[total.head] = total.partial
+        return total.head, total.head
+
+    def _print(self, n: Node) -> None:
+        """Append a value, after those of its operands that folding has made new."""
+        if n.op in FREE or n in self.printed:
+            return
+        for a in n.args:
+            self._print(a)
+        self.printed.add(n)
+        self.order.append(n)
+
+    def _touch(self, value: Node | _Sum) -> None:
+        self.registers[value] = None
+        self.registers.move_to_end(value)
+        while len(self.registers) > REGISTERS:
+            self.registers.popitem(last=False)

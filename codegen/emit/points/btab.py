@@ -1,0 +1,266 @@
+"""The tangent of a cell from the moduli at its points: B^T A B, summed over the points.
+
+The moduli are pulled back to the parent cell first, so that shape functions and their slopes are
+constants. Then node b of a pair is outermost and the sums over the points stay in registers; in
+cells that are products of lines one direction after the other is summed instead
+(`sum_factored_btab`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+from softehl.codegen.emit.points.c_lines import Lines
+from softehl.codegen.emit.points.point_function import Outputs
+from softehl.codegen.emit.points.point_layout import Layout
+from softehl.codegen.language.definition import Component, Quantity
+
+STEM = "pairs_"
+"""Beginning of the names of files that pages share, and of what is in them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parent:
+    """Moduli by values and parent slopes: the array S of a point."""
+
+    layout: Layout
+    outputs: Outputs
+
+    @property
+    def symmetric(self) -> bool:
+        """True if the upper triangle alone is there."""
+        return self.outputs.symmetric
+
+    @cached_property
+    def moduli(self) -> dict[tuple[Quantity, Quantity], str]:
+        """Moduli at the point by what they multiply, as the function gives them; both triangles."""
+        q, found = self.layout.form.own, {}
+        for k, (i, j) in enumerate(self.outputs.moduli):
+            if j not in q:
+                continue
+            found[q[i], q[j]] = f"A[{k}]"
+            if self.symmetric:
+                found[q[j], q[i]] = f"A[{k}]"
+        return found
+
+    @cached_property
+    def of_centroid(self) -> list[dict[Quantity, str]]:
+        """Derivatives of fluxes by each value at the centroid; empty where all are zero."""
+        q, found = self.layout.form.own, []
+        numbers = {value: k for k, value in enumerate(self.layout.form.unknowns)}
+        for value in (self.layout.form.all[k] for k in self.layout.form.centroid):
+            column = numbers.get(value)
+            pairs = enumerate(self.outputs.moduli)
+            found.append({q[i]: f"A[{k}]" for k, (i, j) in pairs if j == column})
+        return found if any(found) else []
+
+    @cached_property
+    def blocks(self) -> dict[tuple[Component, bool, Component, bool], list[tuple[Quantity, ...]]]:
+        """Entries of the moduli by components and whether they are slopes; none is empty."""
+        found: dict[tuple[Component, bool, Component, bool], list[tuple[Quantity, ...]]] = {}
+        for row, column in self.moduli:
+            key = (row.component, row.axis is not None, column.component, column.axis is not None)
+            found.setdefault(key, []).append((row, column))
+        return found
+
+    @cached_property
+    def quantities(self) -> list[Quantity]:
+        """Values and parent slopes of the components, in the order of the page."""
+        found: dict[Quantity, None] = {}
+        for q in self.layout.form.own.values():
+            axes = [None] if q.axis is None else range(self.layout.dimension)
+            found.update(dict.fromkeys(Quantity(q.component, k) for k in axes))
+        order = {c: k for k, c in enumerate(self.layout.components)}
+        return sorted(found, key=lambda q: (order[q.component], -1 if q.axis is None else q.axis))
+
+    @cached_property
+    def numbers(self) -> dict[tuple[Quantity, Quantity], int]:
+        """Place in S of what is not zero."""
+        found: dict[tuple[Quantity, Quantity], int] = {}
+        for n, row in enumerate(self.quantities):
+            for column in self.quantities[n if self.symmetric else 0 :]:
+                slopes = row.axis is not None, column.axis is not None
+                if (row.component, slopes[0], column.component, slopes[1]) in self.blocks:
+                    found[row, column] = len(found)
+        return found
+
+    @property
+    def size(self) -> int:
+        """Entries of S at one point."""
+        return max(len(self.numbers), 1)
+
+    def number(self, row: Quantity, column: Quantity) -> int | None:
+        """Place in S of an entry of both triangles."""
+        mirrored = (column, row) if self.symmetric else (row, column)
+        return self.numbers.get((row, column), self.numbers.get(mirrored))
+
+    def of(self, c: Component) -> list[Quantity]:
+        """Value and parent slopes of a component."""
+        return [q for q in self.quantities if q.component == c]
+
+
+def pulled_back(out: Lines, layout: Layout, outputs: Outputs) -> None:
+    """S of the point q: w T A T^T, where T turns slopes into parent slopes."""
+    parent, D = Parent(layout, outputs), range(layout.dimension)
+    for k in D:
+        out.add(f"const V {', '.join(f'wI{k}{m} = w * I{k}{m}' for m in D)};")
+        out.idle(*(f"wI{k}{m}" for m in D))
+    half: dict[tuple[Quantity, Quantity], str] = {}
+    for (row, column), n in parent.numbers.items():
+        terms = []
+        for axis in [None] if row.axis is None else D:
+            inner = Quantity(row.component, axis)
+            value = _half(out, parent, half, inner, column)
+            if value:
+                terms.append(f"w * {value}" if axis is None else f"wI{row.axis}{axis} * {value}")
+        out.add(f"S[q][{n}] = {' + '.join(terms) or 'softehl_splat(0.0)'};")
+
+
+def _half(
+    out: Lines,
+    parent: Parent,
+    half: dict[tuple[Quantity, Quantity], str],
+    row: Quantity,
+    column: Quantity,
+) -> str:
+    """Name of a modulus whose column is pulled back; empty where it is zero."""
+    if (row, column) not in half:
+        terms = []
+        for axis in [None] if column.axis is None else range(parent.layout.dimension):
+            value = parent.moduli.get((row, Quantity(column.component, axis)))
+            if value:
+                terms.append(value if axis is None else f"{value} * I{column.axis}{axis}")
+        name = f"H{len(half)}" if terms else ""
+        half[row, column] = name
+        if terms:
+            out.add(f"const V {name} = {' + '.join(terms)};")
+    return half[row, column]
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Rows and columns of the tangent of components with shape functions of two orders."""
+
+    parent: Parent
+    order: tuple[int, int]
+    half: bool
+    """Whether rows and columns are the same and symmetric."""
+
+    @property
+    def layout(self) -> Layout:
+        return self.parent.layout
+
+    @property
+    def tables(self) -> str:
+        """Beginning of the names of tables: others than those of the page's own file."""
+        return f"{STEM}{self.layout.d.cell}"
+
+    def components(self, side: int) -> list[Component]:
+        """Of the rows (0) or columns (1)."""
+        found = dict.fromkeys(q.component for q in self.parent.quantities)
+        return [c for c in found if c.order == self.order[side]]
+
+    @cached_property
+    def entries(self) -> list[tuple[Component, Component]]:
+        """Components of rows and columns that have moduli."""
+        met = {(row.component, column.component) for row, column in self.parent.moduli}
+        every = product(self.components(0), self.components(1))
+        return [pair for pair in every if pair in met]
+
+    def store(self, out: Lines, i: Component, j: Component, a: str, b: str, value: str) -> None:
+        """Write an entry of the tangent; of a symmetric one that above the diagonal."""
+        size = len(self.layout.d.unknowns)
+        row, column = self.layout.place(i).at(a), self.layout.place(j).at(b)
+        if self.parent.symmetric and self.layout.field(i) > self.layout.field(j):
+            row, column = column, row
+        out.add(f"k_lanes[({row}) * {size} + {column}] = {value};")
+
+
+def ranks(layout: Layout) -> list[tuple[Any, ...]]:
+    """Ranks of the unknowns: of two mirrored entries that with the row of lower rank is kept."""
+    names = {c.name: c for c in layout.components}
+    found = []
+    for n, (name, node) in enumerate(layout.d.places):
+        c = names[name]
+        line = layout.shape(c.order).line
+        along = line.places[node or 0][::-1] if line is not None else (node,)
+        found.append((layout.field(c), along, n))
+    return found
+
+
+Columns = dict[tuple[Quantity, Component], int]
+
+
+def assembled(out: Lines, pair: Pair) -> None:
+    """Node b outermost, two nodes a at a time, the sums over the points innermost."""
+    layout = pair.layout
+    nodes = [layout.shape(order).nodes for order in pair.order]
+    columns: Columns = {}
+    for q in pair.parent.quantities:
+        for j in pair.components(1):
+            some = [pair.parent.number(q, o) for o in pair.parent.of(j)]
+            if q.component.order == pair.order[0] and any(n is not None for n in some):
+                columns[q, j] = len(columns)
+    out.open(f"for (int b = 0; b < {nodes[1]}; ++b)")
+    out.add(f"V C[{layout.points}][{len(columns)}];")
+    _columns(out, pair, columns)
+    last = "b" if pair.half else str(nodes[0] - 1)
+    out.open(f"for (int a = 0; a <= {last}; a += 2)")
+    out.add(f"const int a2 = a + 1 < {nodes[0]} ? a + 1 : a;")
+    _sums(out, pair, columns)
+    out.close()
+    out.close()
+
+
+def _factor(q: Quantity, node: str) -> str:
+    """Variable that holds the shape function of a node, or its slope."""
+    return f"N{node}" if q.axis is None else f"D{node}{q.axis}"
+
+
+def _factors(out: Lines, pair: Pair, side: int, node: str, index: str) -> None:
+    name, order = pair.tables, pair.order[side]
+    some = [q for q in pair.parent.quantities if q.component.order == order]
+    for axis in sorted({-1 if q.axis is None else q.axis for q in some}):
+        table = (
+            f"{name}_N{order}[q][{index}]" if axis < 0 else f"{name}_D{order}[q][{index}][{axis}]"
+        )
+        factor = f"N{node}" if axis < 0 else f"D{node}{axis}"
+        out.add(f"const double {factor} = {table};")
+        out.idle(factor)
+
+
+def _columns(out: Lines, pair: Pair, columns: Columns) -> None:
+    """C = S B of the node b at every point."""
+    out.open(f"for (int q = 0; q < {pair.layout.points}; ++q)")
+    _factors(out, pair, 1, "b", "b")
+    for (q, j), n in columns.items():
+        terms = []
+        for o in pair.parent.of(j):
+            place = pair.parent.number(q, o)
+            if place is not None:
+                terms.append(f"S[q][{place}] * {_factor(o, 'b')}")
+        out.add(f"C[q][{n}] = {' + '.join(terms)};")
+    out.close()
+
+
+def _sums(out: Lines, pair: Pair, columns: Columns) -> None:
+    """B^T C of two nodes a."""
+    entries = pair.entries
+    for node in ("", "2"):
+        names = [f"k{node}_{n} = softehl_splat(0.0)" for n in range(len(entries))]
+        out.add(f"V {', '.join(names)};")
+    out.open(f"for (int q = 0; q < {pair.layout.points}; ++q)")
+    _factors(out, pair, 0, "a", "a")
+    _factors(out, pair, 0, "c", "a2")
+    for n, (i, j) in enumerate(entries):
+        for q in pair.parent.of(i):
+            if (q, j) in columns:
+                for node, letter in (("", "a"), ("2", "c")):
+                    out.add(f"k{node}_{n} += C[q][{columns[q, j]}] * {_factor(q, letter)};")
+    out.close()
+    for n, (i, j) in enumerate(entries):
+        for node, index in (("", "a"), ("2", "a2")):
+            pair.store(out, i, j, index, "b", f"k{node}_{n}")

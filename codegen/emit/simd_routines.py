@@ -1,0 +1,112 @@
+"""Routines that a kernel calls for several elements at once, as static functions in front of it.
+
+`void f(M active, const V *in, V *out, M *lost)` computes the results for the lanes of `active`;
+those in which there is none are not-a-number, and are added to `lost`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from softehl.codegen.emit import c_routines
+from softehl.codegen.emit.c_printer import number
+from softehl.codegen.emit.simd_printer import LanePrinter
+from softehl.codegen.graph.graph import Routine
+from softehl.codegen.graph.routines import Inverse, Isotropic, Newton
+from softehl.codegen.language.definition import Definition
+
+
+def texts(d: Definition, wanted: Iterable[Routine]) -> list[str]:
+    """C functions of the routines and what they need, each once, callees first."""
+    return c_routines.texts(d, wanted, _text)
+
+
+def _text(d: Definition, r: Routine) -> list[str]:
+    match r:
+        case Newton():
+            return _newton(d, r)
+        case Inverse():
+            return [_inverse(d, r)]
+        case Isotropic():
+            return [*c_routines.texts(d, [r]), _one_by_one(d, r)]
+    raise TypeError(f"no C for {r}")
+
+
+def _signature(d: Definition, r: Routine) -> str:
+    name = f"softehl_{d.name}_{r.name}_lanes"
+    return f"static void {name}(\n    M active, const V *restrict p, V *restrict s, M *lost)\n"
+
+
+def _newton(d: Definition, r: Newton) -> list[str]:
+    """Lanes that are done keep their solution while others go on."""
+    n, first = r.outputs, r.inputs - r.outputs
+    values, targets = c_routines.newton_values(r)
+    body = c_routines.Body(d, d.graph, values, LanePrinter(d, "active"))
+    control, size = r.control, number(float(r.control.size))
+    text = f"""/* {r.name}: {n} local unknowns, at most {control.iterations} Newton steps */
+{_signature(d, r)}{{
+    const double tolerance = {number(float(control.tolerance))};
+    M spoilt = softehl_mask(0);
+    V before[{n}];
+    for (int k = 0; k < {n}; ++k) s[k] = p[{first} + k], before[k] = softehl_splat(HUGE_VAL);
+    for (int step = 0; step < {control.iterations} && softehl_any(active); ++step) {{
+        M failed = softehl_mask(0), far = failed;
+        V g[{n}], A[{n * n}], B[{max(n * first, 1)}];
+{body.text(2, targets)}
+        V felt[{n}];
+        for (int k = 0; k < {n}; ++k) felt[k] = softehl_splat(0.0);
+        for (int i = 0; i < {n}; ++i) {{
+            const V terms = softehl_terms_lanes({n}, A + {n} * i, s, {first}, B + {first} * i, p);
+            far |= ~softehl_le(softehl_vfabs(g[i]), tolerance * terms);
+            for (int k = 0; k < {n}; ++k) {{
+                const V share = softehl_vfabs(A[{n} * i + k]) / terms;
+                felt[k] = softehl_blend(softehl_lt(felt[k], share), share, felt[k]);
+            }}
+        }}
+        failed |= softehl_eliminate_lanes({n}, A, 1, g);
+        spoilt |= active & failed;
+        active &= ~failed;
+        for (int k = 0; k < {n}; ++k) {{
+            s[k] = softehl_blend(active, s[k] - g[k], s[k]);
+            const V change = softehl_vfabs(g[k]);
+            const V close = tolerance * ({size} + softehl_vfabs(s[k]));
+            const M rounding = softehl_lt(0.9 * before[k], change)
+                | softehl_le(felt[k] * change, softehl_splat({c_routines.rounding(r)}));
+            far |= ~(softehl_le(change, close) | rounding);
+            before[k] = change;
+        }}
+        active &= far;
+    }}
+    spoilt |= active;
+    for (int k = 0; k < {n}; ++k) s[k] = softehl_blend(spoilt, softehl_splat(NAN), s[k]);
+    *lost |= spoilt;
+}}
+"""
+    return [*texts(d, body.called), text]
+
+
+def _inverse(d: Definition, r: Inverse) -> str:
+    n = r.size
+    return f"""{_signature(d, r)}{{
+    V A[{n * n}];
+    for (int k = 0; k < {n * n}; ++k) A[k] = p[k], s[k] = softehl_splat(k % {n + 1} == 0);
+    const M spoilt = active & softehl_eliminate_lanes({n}, A, {n}, s);
+    for (int k = 0; k < {n * n}; ++k) s[k] = softehl_blend(spoilt, softehl_splat(NAN), s[k]);
+    *lost |= spoilt;
+}}
+"""
+
+
+def _one_by_one(d: Definition, r: Routine) -> str:
+    """A routine of one element called for each lane that wants it."""
+    return f"""{_signature(d, r)}{{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {{
+        double one[{max(r.inputs, 1)}], out[{r.outputs}];
+        for (int k = 0; k < {r.inputs}; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < {r.outputs}; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_{d.name}_{r.name}(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < {r.outputs}; ++k) softehl_lane(s[k], l) = out[k];
+    }}
+}}
+"""

@@ -1,0 +1,273 @@
+"""Divided differences: (f(x) - f(x')) / gap on the graph, without a difference of close numbers.
+
+Every operation has a rule that is exact for any distance of its operands (Kahan and Fateman 1999,
+Reps and Rall 2003), e.g. uv - u'v' = u (v - v') + (u - u') v' and 1/u - 1/u' = -(u - u') / (u u').
+So the result keeps its digits where x and x' are close, equal, or near a singularity of f.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Place, Routine
+from softehl.codegen.graph.guarded_products import guarded, plus
+from softehl.codegen.graph.traversal import reachable
+
+ROUNDING = Fraction(1, 2**48)
+"""Eigenvalues that differ by less, relative to their sum, are equal but for their rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quotient(Routine):
+    """(f(u) - f(v)) / (u - v) of a function of the C library; operands u, v, f(u), f(v).
+
+    POWER has the exponent as a fifth operand. ATAN2 has two arguments, and operands y, x at both
+    states, the two angles, y x' - x y' divided by the gap, and the gap; its result is the whole
+    divided difference.
+    """
+
+    op: Op
+
+
+QUOTIENTS = {
+    op: Quotient(f"divided_{op}", {Op.POWER: 5, Op.ATAN2: 8}.get(op, 4), 1, op)
+    for op in Op
+    if op not in BOOLEAN
+}
+
+
+@dataclass
+class Divided:
+    """Divided differences of values between a state and another one.
+
+    other: the sources, and what each is at the other state; gap: what is divided by. rates: the
+    divided differences of the sources.
+    """
+
+    g: Graph
+    other: dict[Node, Node]
+    gap: Node
+    rates: dict[Node, Node]
+    equal: Node | None = None
+    symmetric: Callable[[Node], bool] = lambda _: False
+    calls: dict[Node, list[Node]] = field(default_factory=dict)
+
+    def __call__(self, root: Node) -> Node:
+        for n in reachable([root], stop=self.rates.__contains__):
+            if n in self.rates:
+                continue
+            if self.symmetric(n) or all(self.other[a] is a for a in n.args):
+                self.other[n], self.rates[n] = n, self.g.zero
+                continue
+            args = tuple(self.other[a] for a in n.args)
+            self.other[n] = self.g.rebuild(n.op, args, n.payload)
+            if n.op not in BOOLEAN and n.op is not Op.CALL:
+                self.rates[n] = self._rate(n)
+            else:
+                self.rates[n] = self.g.zero
+        return self.rates[root]
+
+    def _rate(self, n: Node) -> Node:
+        g, (a, *rest) = self.g, n.args
+        du = self.rates[a]
+        match n.op:
+            case Op.NAME:
+                return du
+            case Op.NEG:
+                return g.neg(du)
+            case Op.ADD:
+                return plus(g, du, self.rates[rest[0]])
+            case Op.SUB:
+                return plus(g, du, g.neg(self.rates[rest[0]]))
+            case Op.MUL:
+                return self._product(a, rest[0])
+            case Op.BRANCH:
+                return self._branch(n)
+            case Op.ITEM:
+                return self._result(n)
+            case Op.POWER:
+                return self._power(n)
+            case Op.ATAN2:
+                return self._angle(n)
+        return guarded(g, du, self._slope(n, a))
+
+    def _product(self, a: Node, b: Node) -> Node:
+        g = self.g
+        if a is b:
+            return guarded(g, self.rates[a], g.add(a, self.other[a]))
+        left = guarded(g, self.rates[a], self.other[b])
+        return plus(g, left, guarded(g, self.rates[b], a))
+
+    def _slope(self, n: Node, a: Node) -> Node:
+        """(f(u) - f(v)) / (u - v) of a function of one argument."""
+        g, at, there = self.g, n, self.other[n]
+        match n.op:
+            case Op.RECIP:
+                return g.neg(g.mul(at, there))
+            case Op.SQRT:
+                return g.recip(g.add(at, there))
+            case Op.CBRT:
+                return g.recip(self._squares(at, there))
+            case Op.RCBRT:
+                cube = g.power(g.mul(at, there), 3)
+                return g.neg(g.div(cube, self._squares(at, there)))
+            case Op.POW:
+                return self._fixed_power(n, a)
+        operands = (a, self.other[a], at, there)
+        return g.run(QUOTIENTS[n.op], operands)[0]
+
+    def _squares(self, a: Node, b: Node) -> Node:
+        g = self.g
+        return g.add(g.add(g.mul(a, a), g.mul(a, b)), g.mul(b, b))
+
+    def _fixed_power(self, n: Node, a: Node) -> Node:
+        """Powers that are products of roots by their factors, others as functions."""
+        g, e = self.g, n.payload
+        assert isinstance(e, Fraction)
+        if e.denominator > 3:
+            operands = (a, self.other[a], n, self.other[n], g.const(e))
+            return g.run(QUOTIENTS[Op.POWER], operands)[0]
+        root = {1: a, 2: g.call(Op.SQRT, a), 3: g.call(Op.CBRT, a)}[e.denominator]
+        inside = Divided(g, {a: self.other[a]}, self.gap, {a: g.one})
+        return inside(_inverted(g, _multiplied(g, root, abs(e.numerator)), e < 0))
+
+    def _power(self, n: Node) -> Node:
+        """First the base moves, then the exponent."""
+        g, (a, e) = self.g, n.args
+        b, f = self.other[a], self.other[e]
+        between = g.general_power(b, e)
+        base = g.run(QUOTIENTS[Op.POWER], (a, b, n, between, e))[0]
+        total = guarded(g, self.rates[a], base)
+        if e is f:
+            return total
+        log = g.call(Op.LOG, b)
+        operands = (g.mul(e, log), g.mul(f, log), between, self.other[n])
+        exponent = g.mul(log, g.run(QUOTIENTS[Op.EXP], operands)[0])
+        return plus(g, total, guarded(g, self.rates[e], exponent))
+
+    def _angle(self, n: Node) -> Node:
+        g, (y, x) = self.g, n.args
+        v, w = self.other[y], self.other[x]
+        turned = g.sub(g.mul(self.rates[y], w), g.mul(self.rates[x], v))
+        operands = (y, x, v, w, n, self.other[n], turned, self.gap)
+        return g.run(QUOTIENTS[Op.ATAN2], operands)[0]
+
+    def _branch(self, n: Node) -> Node:
+        """The rule of one side where both states take it, else the difference of the values."""
+        g, (c, a, b) = self.g, n.args
+        then, otherwise = self.rates[a], self.rates[b]
+        if self.other[c] is c or self.equal is None:
+            return g.branch(c, then, otherwise)
+        apart = g.div(g.sub(n, self.other[n]), self.gap)
+        first, second = (g.branch(self.equal, side, apart) for side in (then, otherwise))
+        there = self.other[c]
+        return g.branch(c, g.branch(there, then, first), g.branch(there, second, otherwise))
+
+    def _result(self, n: Node) -> Node:
+        call, routine = n.args[0], n.args[0].payload
+        assert isinstance(n.payload, Place)
+        assert isinstance(routine, Routine)
+        if call not in self.calls:
+            self.calls[call] = routine.divided(self, call)
+        return self.calls[call][n.payload.index]
+
+    def slopes(
+        self, values: Sequence[Node], other: Mapping[Node, Node]
+    ) -> tuple[list[list[Node]], Node | None]:
+        """Divided differences of values by each key of `other` alone.
+
+        Also the condition under which they are right: all branches are taken as at the other state.
+        """
+        g, columns = self.g, []
+        for s in other:
+            rates = {t: g.one if t is s else g.zero for t in other}
+            inside = Divided(g, dict(other), self.gap, rates)
+            columns.append([inside(v) for v in values])
+        same: Node | None = None
+        for n in reachable(values, stop=other.__contains__):
+            if n.op is Op.BRANCH and inside.other[n.args[0]] is not n.args[0]:
+                c, there = n.args[0], inside.other[n.args[0]]
+                both = g.node(Op.AND, (c, there))
+                none = g.node(Op.NOT, (g.node(Op.OR, (c, there)),))
+                alike = g.node(Op.OR, (both, none))
+                same = alike if same is None else g.node(Op.AND, (same, alike))
+        return [list(row) for row in zip(*columns, strict=True)], same
+
+
+def _multiplied(g: Graph, a: Node, n: int) -> Node:
+    if n == 1:
+        return a
+    half = _multiplied(g, a, n // 2)
+    square = g.mul(half, half)
+    return g.mul(square, a) if n % 2 else square
+
+
+def _inverted(g: Graph, a: Node, negative: bool) -> Node:
+    return g.recip(a) if negative else a
+
+
+def exchanged(g: Graph, values: Sequence[Node], a: Node, b: Node) -> Divided:
+    """Divided differences by a - b between the state and that with `a` and `b` exchanged."""
+    gap, total = g.sub(a, b), g.add(a, b)
+    bound = g.mul(g.const(ROUNDING**2), g.mul(total, total))
+    equal = g.compare(Op.LE, g.mul(gap, gap), bound)
+    unchanged = _unchanged(values, {a: b, b: a})
+    rates = {a: g.one, b: g.neg(g.one)}
+    return Divided(g, {a: b, b: a}, gap, rates, equal, unchanged.__contains__)
+
+
+def _unchanged(roots: Sequence[Node], swap: Mapping[Node, Node]) -> frozenset[Node]:
+    """Values that an exchange of inputs leaves as they are, sums and products in any order."""
+    numbers: dict[Any, int] = {}
+    here, there = _Content(numbers, {}), _Content(numbers, swap)
+    return frozenset(n for n in reachable(roots) if here(n) == there(n))
+
+
+class _Content:
+    """Number of a value: equal numbers for equal sums or products of equal values."""
+
+    def __init__(self, numbers: dict[Any, int], swap: Mapping[Node, Node]) -> None:
+        self.numbers, self.swap = numbers, swap
+        self.known: dict[Node, int] = {}
+        self.parts: dict[Node, Counter[int]] = {}
+
+    def __call__(self, n: Node) -> int:
+        """The number; those of the operands are known."""
+        if n.op is Op.NAME:
+            self.known[n] = self.known[n.args[0]]
+            self.parts[n] = self.parts[n.args[0]]
+            return self.known[n]
+        if n.op in (Op.ADD, Op.SUB, Op.NEG):
+            kind, parts = "sum", self._sum(n)
+        elif n.op is Op.MUL:
+            kind, parts = "product", self._parts(n.args[0], Op.MUL) + self._parts(n.args[1], Op.MUL)
+        else:
+            kind, parts = "", Counter()
+        if kind:
+            content: Any = (kind, tuple(sorted((k, c) for k, c in parts.items() if c)))
+        elif n.args:
+            content = (n.op, n.payload, tuple(self.known[a] for a in n.args))
+        else:
+            content = self.swap.get(n, n)
+        self.known[n] = self.numbers.setdefault(content, len(self.numbers))
+        self.parts[n] = parts
+        return self.known[n]
+
+    def _sum(self, n: Node) -> Counter[int]:
+        total: Counter[int] = Counter()
+        for k, a in enumerate(n.args):
+            sign = -1 if n.op is Op.NEG or (n.op is Op.SUB and k) else 1
+            for part, count in self._parts(a, Op.ADD).items():
+                total[part] += sign * count
+        return total
+
+    def _parts(self, n: Node, op: Op) -> Counter[int]:
+        inner = n
+        while inner.op is Op.NAME:
+            inner = inner.args[0]
+        joined = (Op.MUL,) if op is Op.MUL else (Op.ADD, Op.SUB, Op.NEG)
+        return self.parts[inner] if inner.op in joined else Counter({self.known[n]: 1})

@@ -1,0 +1,344 @@
+"""Values of an unoptimised graph in arbitrary precision: the walk of the oracle.
+
+Routines have values of their own here, without their derivatives and their C: local unknowns are
+found by Newton's method with differences for slopes; derivatives of functions of stretches are
+differences of the function of the matrix.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+from mpmath.libmp import NoConvergence
+
+from softehl.codegen.graph.graph import Input, Node, Op, Place, Routine
+from softehl.codegen.graph.precise_arithmetic import arctangent, number
+from softehl.codegen.graph.routines import Inverse, Isotropic, Newton, depends
+from softehl.codegen.graph.traversal import Recursion, reachable, recursion
+
+Number = Any
+Vector = list[Number]
+Evaluate = Callable[[Sequence[Node], Vector, Vector], Vector]
+
+
+def results(r: Routine, args: Vector, evaluate: Evaluate) -> Vector:
+    """Results of a routine in the working precision of mpmath; not-a-number where it has none."""
+    match r:
+        case Newton():
+            return _newton(r, args, evaluate)
+        case Inverse():
+            inverted = mpmath.matrix(r.size, r.size)
+            for k, a in enumerate(args):
+                inverted[k // r.size, k % r.size] = a
+            inverted = inverted**-1
+            return [inverted[i, j] for i in range(r.size) for j in range(r.size)]
+        case Isotropic():
+            return _isotropic(r, args, evaluate)
+    raise TypeError(f"no value for {r}")
+
+
+def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
+    p, s = args[: r.inputs - r.outputs], args[r.inputs - r.outputs :]
+    before, A = mpmath.inf, None
+    for _ in range(200):
+        A = A or _slopes(r, s, p, evaluate)
+        try:
+            step = mpmath.lu_solve(A, mpmath.matrix(evaluate(r.equations, s, p)))
+        except ZeroDivisionError:
+            break
+        s = [v - step[i] for i, v in enumerate(s)]
+        digits = mpmath.mpf(10) ** (8 - mpmath.mp.dps)
+        changes = [abs(v) for v in step]
+        near = all(c <= digits * abs(v) for c, v in zip(changes, s, strict=True))
+        if near or digits * max(1, *map(abs, s)) >= max(changes) > before / 2:
+            return s  # to its own digits, or to those that rounding leaves
+        before = max(changes)
+        if before > _CLOSE * max(map(abs, s)):  # else these slopes give eight digits a step
+            A = None
+    return [mpmath.nan] * len(s)
+
+
+_CLOSE = 1e-8
+
+
+def _slopes(r: Newton, s: Vector, p: Vector, evaluate: Evaluate) -> mpmath.matrix:
+    """dg/ds by differences."""
+    h = mpmath.mpf(10) ** (-mpmath.mp.dps // 3)
+    A = mpmath.matrix(len(s), len(s))
+    for j in range(len(s)):
+        plus, minus = (
+            evaluate(r.equations, [v + t * h * (i == j) for i, v in enumerate(s)], p)
+            for t in (1, -1)
+        )
+        for i in range(len(s)):
+            A[i, j] = (plus[i] - minus[i]) / (2 * h)
+    return A
+
+
+def _isotropic(r: Isotropic, args: Vector, evaluate: Evaluate) -> Vector:
+    h = mpmath.mpf(10) ** (-mpmath.mp.dps // 4)
+
+    def derivative(entries: Vector, path: tuple[int, ...]) -> Number:
+        if not path:
+            return _energy(r, [*entries, *args[6:]], evaluate)
+        plus, minus = (
+            derivative([v + t * h * (i == path[0]) for i, v in enumerate(entries)], path[1:])
+            for t in (1, -1)
+        )
+        return (plus - minus) / (2 * h)
+
+    paths: list[tuple[int, ...]] = [()]
+    if r.order == 1:
+        paths = [(i,) for i in range(6)]
+    elif r.order == 2:
+        paths = [(i, j) for i in range(6) for j in range(i, 6)]
+    return [derivative(args[:6], path) for path in paths]
+
+
+def _energy(r: Isotropic, args: Vector, evaluate: Evaluate) -> Number:
+    a, b, c, d, e, f = args[:6]
+    eigenvalues = mpmath.eigsy(mpmath.matrix([[a, d, e], [d, b, f], [e, f, c]]), eigvals_only=True)
+    return evaluate([r.energy], list(eigenvalues), args[6:])[0]
+
+
+def symmetric(value: Node, unknowns: Sequence[Node]) -> bool:
+    """True when `value` does not change under exchanges of `unknowns`.
+
+    It is compared at random points between 1/64 and 64, where a function that is one-sided far
+    from 1 shows it; points without a real value are left out.
+    """
+    rng = random.Random(0)
+    inside = depends([value], unknowns)
+    leaves = (Op.INPUT, Op.SUM, Op.ITEM)
+    inputs = [n for n in reachable([value]) if n.op in leaves and n not in inside]
+    with mpmath.workdps(30):
+        for width in (0.5, 2, 4, 6, 6, 6, 6, 6):
+            point = [mpmath.mpf(2) ** rng.uniform(-width, width) for _ in unknowns]
+            at = {n: mpmath.mpf(2) ** rng.uniform(-width, width) for n in inputs}
+            turns = [list(reversed(point))]
+            turns += [[*point[k:], *point[:k]] for k in range(len(unknowns))]
+            found = [_value_at(value, {**at, **dict(zip(unknowns, t, strict=True))}) for t in turns]
+            if any(v is None for v in found):
+                if any(v is not None for v in found):
+                    return False
+            elif any(abs(v - found[0]) > 1e-20 * (1 + abs(found[0])) for v in found):
+                return False
+    return True
+
+
+def alike(a: Node, b: Node) -> bool:
+    """True when two values are equal at random values of all that enters them."""
+    rng = random.Random(1)
+    leaves = [n for n in reachable([a, b]) if n.op in (Op.INPUT, Op.SUM, Op.ITEM)]
+    with mpmath.workdps(30):
+        at = {n: mpmath.mpf(rng.uniform(-1, 1)) for n in leaves}
+        one, other = _value_at(a, dict(at)), _value_at(b, dict(at))
+        return None in (one, other) or abs(one - other) <= 1e-20 * (1 + abs(one))
+
+
+def _value_at(value: Node, at: dict[Node, Any]) -> Any:
+    """A value from those of the inputs; None where it is not real."""
+    for n in reachable([value], stop=at.__contains__):
+        if n not in at:
+            try:
+                at[n] = _operation(n, [at[a] for a in n.args])
+            except (ArithmeticError, TypeError, ValueError, NoConvergence):
+                return None
+    real = not isinstance(at[value], mpmath.mpc) and not mpmath.isnan(at[value])
+    return at[value] if real else None
+
+
+def _operation(n: Node, args: Vector) -> Any:
+    if n.op is Op.ITEM:
+        assert isinstance(n.payload, Place)
+        return args[0][n.payload.index]
+    if n.op is Op.CALL:
+        assert isinstance(n.payload, Routine)
+        return results(n.payload, args, _localised)
+    return number(n, args)
+
+
+def _localised(values: Sequence[Node], local: Vector, external: Vector) -> Vector:
+    """Values of a routine from its arguments."""
+    at: dict[Node, Any] = {}
+    arrays = {"local": local, "external": external}
+    found = []
+    for n in reachable(values):
+        if n.op is Op.INPUT:
+            assert isinstance(n.payload, Input)
+            at[n] = arrays[n.payload.array][n.payload.index]
+    for value in values:
+        found.append(_value_at(value, at))
+        if found[-1] is None:
+            raise ValueError("a local equation has no real value")
+    return found
+
+
+_UNARY: dict[Op, Callable[[Number], Number]] = {
+    Op.NAME: lambda a: a,
+    Op.NEG: lambda a: -a,
+    Op.RECIP: lambda a: 1 / a,
+    Op.SQRT: mpmath.sqrt,
+    Op.CBRT: mpmath.cbrt,
+    Op.RCBRT: lambda a: 1 / mpmath.cbrt(a),
+    Op.LOG: mpmath.log,
+    Op.EXP: mpmath.exp,
+    Op.SIN: mpmath.sin,
+    Op.COS: mpmath.cos,
+    Op.TAN: lambda a: mpmath.sin(a) / mpmath.cos(a),
+    Op.ASIN: mpmath.asin,
+    Op.ACOS: mpmath.acos,
+    Op.ATAN: mpmath.atan,
+    Op.SINH: lambda a: (mpmath.exp(a) - mpmath.exp(-a)) / 2,
+    Op.COSH: lambda a: (mpmath.exp(a) + mpmath.exp(-a)) / 2,
+    Op.TANH: mpmath.tanh,
+    Op.ASINH: mpmath.asinh,
+    Op.ACOSH: mpmath.acosh,
+    Op.ATANH: mpmath.atanh,
+    Op.ERF: mpmath.erf,
+    Op.ERFC: mpmath.erfc,
+    Op.NOT: lambda a: not a,
+}
+_BINARY: dict[Op, Callable[[Number, Number], Number]] = {
+    Op.ATAN2: arctangent,
+    Op.POWER: lambda a, e: a**e,
+    Op.ADD: lambda a, b: a + b,
+    Op.SUB: lambda a, b: a - b,
+    Op.MUL: lambda a, b: a * b,
+    Op.LT: lambda a, b: a < b,
+    Op.LE: lambda a, b: a <= b,
+    Op.EQ: lambda a, b: a == b,
+    Op.AND: lambda a, b: a and b,
+    Op.OR: lambda a, b: a or b,
+}
+
+
+@dataclass(frozen=True)
+class State:
+    """Arguments of one element: exact numbers, as doubles or mpmath values.
+
+    `rule` holds rows (coordinates..., weight); `basis` [point][mode] = (value, xi-derivative)
+    of each field; `point_data` [point][entry].
+    """
+
+    coordinates: Sequence[Number]
+    dofs: Sequence[Number]
+    data: Sequence[Number] = ()
+    parameters: Sequence[Number] = ()
+    rule: Sequence[Sequence[Number]] = ((1,),)
+    basis: Sequence[Sequence[Sequence[Number]]] = ()
+    point_data: Sequence[Sequence[Number]] = ()
+
+
+class Walk:
+    """One evaluation; values are remembered per node and point."""
+
+    def __init__(
+        self,
+        state: State,
+        frozen: Mapping[tuple[Node, int], Number],
+        dofs: Vector | None = None,
+    ) -> None:
+        self.state = state
+        self.frozen = frozen
+        self.arrays: dict[str, Vector] = {
+            "coordinates": exact(state.coordinates),
+            "dofs": exact(state.dofs) if dofs is None else dofs,
+            "data": exact(state.data),
+            "parameters": exact(state.parameters),
+        }
+        self.known: dict[tuple[Node, int], Number] = {}
+
+    def value(self, n: Node) -> Number:
+        """Value of a node that does not vary with the point."""
+        return self.at(n, 0)
+
+    def at(self, n: Node, q: int) -> Number:
+        """Value of a node at point `q`."""
+        return recursion(self._at(n, q))
+
+    def _at(self, n: Node, q: int) -> Recursion[Number]:
+        q = q if n.varying else 0
+        key = (n, q)
+        if key in self.frozen:
+            return self.frozen[key]
+        if key not in self.known:
+            self.known[key] = yield self._compute(n, q)
+        return self.known[key]
+
+    def _compute(self, n: Node, q: int) -> Recursion[Number]:
+        match n.op:
+            case Op.CONST:
+                return mpmath.mpf(n.value.numerator) / n.value.denominator
+            case Op.PI:
+                return +mpmath.pi
+            case Op.INPUT:
+                assert isinstance(n.payload, Input)
+                return self._input(n.payload, q)
+            case Op.SUM:
+                terms = []
+                for k in range(len(self.state.rule)):
+                    terms.append((yield self._at(n.args[0], k)))
+                return mpmath.fsum(terms)
+            case Op.BRANCH:
+                taken = yield self._at(n.args[0], q)
+                return (yield self._at(n.args[1 if taken else 2], q))
+            case Op.CALL:
+                assert isinstance(n.payload, Routine)
+                operands = []
+                for a in n.args:
+                    operands.append((yield self._at(a, q)))
+                return results(n.payload, operands, _local)
+            case Op.ITEM:
+                assert isinstance(n.payload, Place)
+                return (yield self._at(n.args[0], q))[n.payload.index]
+            case Op.POW:
+                e: Any = n.payload
+                return (yield self._at(n.args[0], q)) ** (mpmath.mpf(e.numerator) / e.denominator)
+        args = []
+        for a in n.args:
+            args.append((yield self._at(a, q)))
+        return _UNARY[n.op](*args) if len(args) == 1 else _BINARY[n.op](*args)
+
+    def _input(self, source: Input, q: int) -> Number:
+        if source.array == "rule":
+            return mpmath.mpf(self.state.rule[q][source.index])
+        if source.array == "point data":
+            return mpmath.mpf(self.state.point_data[q][source.index])
+        if source.array == "interpolated":
+            modes = self.state.basis[q]
+            unknowns = self.arrays["dofs"][-len(modes) :]
+            return mpmath.fsum(
+                mpmath.mpf(b[source.index]) * p for b, p in zip(modes, unknowns, strict=True)
+            )
+        return self.arrays[source.array][source.index]
+
+
+def exact(values: Sequence[Number]) -> Vector:
+    """Numbers of the working precision."""
+    return [mpmath.mpf(v) for v in values]
+
+
+def _local(values: Sequence[Node], local: Vector, external: Vector) -> Vector:
+    """Localised values of a routine."""
+    walk = Walk(State((), ()), {})
+    walk.arrays = {"local": local, "external": external}
+    return [walk.value(n) for n in values]
+
+
+def evaluate(root: Node, inputs: Mapping[tuple[str, int], Number], digits: int = 50) -> Number:
+    """Value of a graph without loops, for the tests of passes and derivatives."""
+    arrays: dict[str, Vector] = {}
+    for n in reachable([root]):
+        if isinstance(n.payload, Input):
+            column = arrays.setdefault(n.payload.array, [])
+            column += [0] * (n.payload.index + 1 - len(column))
+            column[n.payload.index] = inputs[n.payload.array, n.payload.index]
+    with mpmath.workdps(digits):
+        walk = Walk(State((), ()), {})
+        walk.arrays = {k: exact(v) for k, v in arrays.items()}
+        return walk.value(root)

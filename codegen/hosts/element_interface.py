@@ -1,0 +1,212 @@
+"""A page as a host sees it: its unknowns by name and node, who fills each argument, its history.
+
+Every file of `codegen.hosts` reads this record and no other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from softehl.codegen.abi import TargetError
+from softehl.codegen.derive import task_outputs
+from softehl.codegen.elements import cells
+from softehl.codegen.elements.cells import Element
+from softehl.codegen.language.definition import Argument, Definition
+
+
+@dataclass(frozen=True)
+class Nodal:
+    """Unknowns of one name: `places` are their numbers at the nodes 0, 1, ... of the element."""
+
+    name: str
+    places: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Given:
+    """An argument that a user gives: number `index` of his list."""
+
+    index: int
+
+
+@dataclass(frozen=True)
+class Timed:
+    """An argument from the step in time: its length `dt`, or `rate`, which is 1 / dt."""
+
+    what: str
+
+
+@dataclass(frozen=True)
+class Before:
+    """A datum from the values before the step: of unknown `place`, or (`rate`) minus it by dt."""
+
+    place: int
+    rate: bool
+
+
+Source = Given | Timed | Before
+
+
+@dataclass(frozen=True)
+class Interface:
+    """A page with a fixed number of unknowns; `of` makes it."""
+
+    definition: Definition
+
+    @staticmethod
+    def of(d: Definition, host: str) -> Interface:
+        """Raises `TargetError` for a page of interpolated fields, which no host can number."""
+        if d.interpolated:
+            raise TargetError(
+                f"{d.name} interpolates {d.interpolated} with any number of unknowns: target "
+                f"{host} needs a fixed number, use simd or scalar"
+            )
+        return Interface(replace(d, pseudo_load=False, fields_rate=False))
+
+    def require(self, host: str, *tasks: str) -> None:
+        """Raise `TargetError` where the page does not offer a task that a host needs."""
+        missing = [t for t in tasks if t not in self.tasks]
+        if missing:
+            raise TargetError(
+                f"{self.name} offers no task {' and '.join(missing)}, which target {host} needs: "
+                "name it in m.offer(tasks=[...]), or leave tasks out"
+            )
+
+    @property
+    def name(self) -> str:
+        """Name of the page, and the first part of the names of its C functions."""
+        return self.definition.name
+
+    @cached_property
+    def tasks(self) -> list[str]:
+        """Tasks that the page offers."""
+        return task_outputs.tasks(self.definition)
+
+    @property
+    def symmetric(self) -> bool:
+        """True where the tangent is symmetric."""
+        return self.definition.conservative
+
+    @property
+    def points(self) -> int:
+        """Number of quadrature points."""
+        return len(self.definition.rule.weights)
+
+    @property
+    def rule(self) -> list[list[float]]:
+        """Rows (parent coordinates..., weight) of the quadrature rule."""
+        rule = self.definition.rule
+        pairs = zip(rule.points, rule.weights, strict=True)
+        return [[float(x.evalf(30)) for x in (*point, weight)] for point, weight in pairs]
+
+    @property
+    def dimension(self) -> int:
+        """Coordinates of a node."""
+        return len(self.definition.coordinates)
+
+    @cached_property
+    def cell(self) -> Element | None:
+        """Standard element of which the page has nodes, coordinates and rule; None for others."""
+        found = cells.of(self.definition.nodes, self.definition.rule.dimension)
+        return found[0] if found and found[0].dimension == self.dimension else None
+
+    # unknowns -----------------------------------------------------------------------------------
+
+    @cached_property
+    def nodal(self) -> tuple[Nodal, ...]:
+        """Unknowns that stand at nodes, by name, in the order of the page."""
+        found: dict[str, list[int]] = {}
+        for place, (name, node) in enumerate(self.definition.places):
+            if node is not None:
+                found.setdefault(name, []).append(place)
+        return tuple(Nodal(name, tuple(places)) for name, places in found.items())
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """Unknowns that belong to the element alone."""
+        return tuple(name for name, node in self.definition.places if node is None)
+
+    @cached_property
+    def vector(self) -> tuple[int, ...]:
+        """Numbers in `nodal` of the components of the first vector: the displacements."""
+        first = [
+            place
+            for start, width in self.definition.nodal
+            if width == self.dimension
+            for place in range(start, start + width)
+        ]
+        found = [k for k, f in enumerate(self.nodal) if f.places[0] in first]
+        return tuple(found[: self.dimension])
+
+    def at_node(self, node: int) -> list[int]:
+        """Numbers of the unknowns at a node, in the order of the names."""
+        return [f.places[node] for f in self.nodal if node < len(f.places)]
+
+    def by_node(self) -> list[int]:
+        """Numbers of the unknowns, node after node."""
+        return [place for node in range(self.definition.nodes) for place in self.at_node(node)]
+
+    # arguments ----------------------------------------------------------------------------------
+
+    @cached_property
+    def _sources(self) -> tuple[list[Source], list[Source], list[Argument]]:
+        d, given = self.definition, list[Argument]()
+        old = dict(_previous(d, "_old"))
+        rates = dict(_previous(d, "_rate")) if "rate" in {a.name for a in d.parameters} else {}
+        timed = {"dt", "rate"} if rates else {"dt"}
+
+        def source(a: Argument, filled: Mapping[str, Source]) -> Source:
+            if a.name in filled:
+                return filled[a.name]
+            given.append(a)
+            return Given(len(given) - 1)
+
+        parameters = [source(a, {name: Timed(name) for name in timed}) for a in d.parameters]
+        data = [source(a, {**old, **rates}) for a in d.data]
+        return parameters, data, given
+
+    @property
+    def parameters(self) -> list[Source]:
+        """Source of each parameter."""
+        return self._sources[0]
+
+    @property
+    def data(self) -> list[Source]:
+        """Source of each datum of the element."""
+        return self._sources[1]
+
+    @property
+    def given(self) -> list[Argument]:
+        """Parameters, then data, that a user gives."""
+        return self._sources[2]
+
+    @property
+    def state(self) -> tuple[Argument, ...]:
+        """Data of each point: what a host stores between steps."""
+        return self.definition.point_data
+
+    @property
+    def variables(self) -> int:
+        """Numbers that a host may store for an element: state and fields of all points, or 1."""
+        return max(self.points * (len(self.state) + len(self.definition.fields)), 1)
+
+    @cached_property
+    def renewed(self) -> list[int | None]:
+        """For each datum of a point the field that is its new value, None where it stays."""
+        fields = [name for name, _ in self.definition.fields]
+        history = self.definition.history
+        return [fields.index(f"new_{a.name}") if a.name in history else None for a in self.state]
+
+    @property
+    def remembers(self) -> bool:
+        """True where the page renews data of points: history."""
+        return any(k is not None for k in self.renewed)
+
+
+def _previous(d: Definition, suffix: str) -> Iterator[tuple[str, Before]]:
+    """Data such as u_old1 (for an unknown u at node 1) and the unknown whose value before it is."""
+    for place, (name, node) in enumerate(d.places):
+        if node is not None:
+            yield f"{name}{suffix}{node + 1}", Before(place, suffix == "_rate")

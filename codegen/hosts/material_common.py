@@ -1,0 +1,118 @@
+"""Shared files of the hosts of materials: words of texts, a cell that tests the law, a block.
+
+The cell is a tetrahedron of 4 nodes. The small host has one that asks the law for stress and
+modulus as the program does; it must give the forces and the stiffness of the law in our own cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+from softehl.codegen.abi import Task
+from softehl.codegen.elements import cells
+from softehl.codegen.graph.evaluation import State
+from softehl.codegen.hosts import abaqus_host as host
+from softehl.codegen.hosts import c_interface, patch_mesh
+from softehl.codegen.hosts.abaqus_deck import named
+from softehl.codegen.hosts.abaqus_element import arguments, conditions
+from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.material_response import Measure, Response, solid
+from softehl.codegen.hosts.test_states import samples
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.pipeline import compile_model
+
+States = Callable[[Definition], Sequence[State]]
+"""States at which a page has values."""
+PULL, TWIST = 0.2, 0.3
+"""Stretch of the block in a deck, and its twist by shear."""
+
+
+def words(r: Response, element: str) -> dict[str, object]:
+    """Words of the texts of a host; element: C of the number of the element."""
+    page = r.page
+    outputs = _outputs(r)
+    small = r.measure is Measure.SMALL
+    stress, _, modulus = str(r.measure).partition(" and ")
+    rows = [f"| {k + 1} | {a.name}: {a.meaning} |" for k, a in enumerate(r.parameters)]
+    return {
+        "name": r.law.name,
+        "NAME": r.law.name.upper(),
+        "given": len(r.parameters),
+        "arguments": "".join(arguments(page)),
+        "conditions": "".join(conditions(page, element)),
+        "history": "".join(_history(page)),
+        "state": ", ".join(a.name for a in page.state) or "none",
+        "outputs": ", ".join(outputs) or "none",
+        "output": len(outputs),
+        "own": r.own,
+        "depvar": len(page.state) + len(outputs),
+        "small": ".true." if small else ".false.",
+        "properties": "\n".join(rows) or "| | none |",
+        "stress": stress,
+        "modulus": modulus,
+        "symmetry": "symmetric" if r.symmetric else "not symmetric (`UNSYMM` in the deck)",
+        "steps": "Small strains: NLGEOM=NO." if small else "Large strains: NLGEOM=YES.",
+    }
+
+
+def _outputs(r: Response) -> list[str]:
+    """Fields that the law gives, without its history."""
+    d = r.definition
+    return [name for name, _ in d.fields[r.own : len(d.fields) - len(d.history)]]
+
+
+def _history(page: Interface) -> Iterable[str]:
+    """Lines of C that store the new state."""
+    for k, field in enumerate(page.renewed):
+        value = f"data[{k}]" if field is None else f"fields[{field}]"
+        yield f"    after[{k}] = {value};\n"
+
+
+def depvar(r: Response) -> list[str]:
+    """Lines of a deck with the number of state variables."""
+    return ["*DEPVAR", str(n)] if (n := words(r, "")["depvar"]) else []
+
+
+def tests(r: Response, states: States) -> tuple[dict[str, str], list[float]]:
+    """Files of the small host, and values of the constants."""
+    d = solid(r.law)
+    page = Interface(replace(d, tasks=(Task.TANGENT, Task.FIELDS)[: 1 + bool(d.fields)]))
+    kernel = compile_model(page.definition)
+    found = samples(page, kernel, host.in_time(page, states(page.definition)))
+    settings = host.settings_of(page, found[0])
+    stored = len(page.state) + len(_outputs(r))
+    assert page.cell is not None
+    return {
+        "tetrahedron.f90": c_interface.template("tetrahedron.f90"),
+        "host.f90": host.program(page),
+        "samples.txt": host.sample_file(page, found, stored),
+        "patch.txt": host.patch_file(_from_zero(page), patch_mesh.patch(page.cell), settings),
+    }, settings
+
+
+def _from_zero(page: Interface) -> Interface:
+    """The page with a state that begins as zero, whatever its example is."""
+    state = {a.name for a in page.state}
+    example = tuple(pair for pair in page.definition.example if pair[0] not in state)
+    return Interface(replace(page.definition, example=example))
+
+
+def block(count: int = 2) -> tuple[list[str], list[str], list[str]]:
+    """Lines of a deck: nodes and elements of a distorted block, and what is held on its ends."""
+    mesh = patch_mesh.patch(cells.element("hex8"), count)
+    nodes = [f"{n + 1}, {', '.join(map(repr, p))}" for n, p in enumerate(mesh.points)]
+    elements = [
+        f"{n + 1}, {', '.join(str(k + 1) for k in cell)}" for n, cell in enumerate(mesh.cells)
+    ]
+    held = [f"{n + 1}, 1, 3, 0.0" for n in mesh.left]
+    for n in mesh.right:
+        _, y, z = mesh.points[n]
+        moves = (PULL, -TWIST * (z - 1.5), TWIST * (y - 1.5))
+        held += [f"{n + 1}, {k + 1}, {k + 1}, {v!r}" for k, v in enumerate(moves)]
+    return nodes, elements, held
+
+
+def constants(r: Response, values: Sequence[float]) -> list[str]:
+    """Lines of *USER MATERIAL: names, then values; those of `m.example` where the law has them."""
+    return named(r.parameters, values, r.written.example)

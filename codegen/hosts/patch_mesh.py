@@ -1,0 +1,127 @@
+"""A small patch of standard cells, for the tests and the input decks of hosts.
+
+Two or more cells a direction in the unit square (cube), moved by 1 from the axes and distorted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import permutations, product
+
+from softehl.codegen.elements.cells import Element
+from softehl.codegen.hosts.element_interface import Interface
+
+Place = tuple[Fraction, ...]
+Map = Callable[[Place], Place]
+CELLS = {1: 4, 2: 3, 3: 2}
+"""Cells a direction, by the dimension."""
+PULL = 0.05
+"""Value of the first unknown on the right side, where the others are zero."""
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Nodes of a mesh, cells by the numbers of their nodes, and nodes of its ends."""
+
+    points: list[list[float]]
+    cells: list[list[int]]
+    left: list[int]
+    right: list[int]
+
+
+def patch(kind: Element, count: int | None = None) -> Patch:
+    """The patch of a kind of cell."""
+    count = count or CELLS[kind.dimension]
+    number: dict[Place, int] = {}
+    cells = []
+    for corner in product(range(count), repeat=kind.dimension):
+        for to_cube in _parts(kind):
+            places = [to_cube(_exact(p)) for p in kind.nodes]
+            moved = [tuple((c + x) / count for c, x in zip(corner, p, strict=True)) for p in places]
+            cells.append([number.setdefault(p, len(number)) for p in moved])
+    ends = [[k for p, k in number.items() if p[0] == end] for end in (0, 1)]
+    return Patch([_distorted(p) for p in number], cells, ends[0], ends[1])
+
+
+def _exact(place: tuple[object, ...]) -> Place:
+    return tuple(Fraction(str(c)) for c in place)
+
+
+def _parts(kind: Element) -> Iterator[Map]:
+    """Maps from the parent cell to its parts of the unit cube."""
+    d = kind.dimension
+    if min(c for p in kind.nodes for c in p) < 0 and kind.name != "wedge6":
+        yield lambda p: tuple((1 + c) / 2 for c in p)
+    elif kind.name == "wedge6":
+        for part in _simplices(2):
+            yield lambda p, part=part: (*part(p[:2]), (1 + p[2]) / 2)  # type: ignore[misc]
+    else:
+        yield from _simplices(d)
+
+
+def _simplices(d: int) -> Iterator[Map]:
+    """Maps of the unit simplex to the d! ones that fill the cube, none turned inside out."""
+    for order in permutations(range(d)):
+        corners = [tuple(Fraction(k in order[:n]) for k in range(d)) for n in range(d + 1)]
+        if sum(a > b for k, b in enumerate(order) for a in order[:k]) % 2:
+            corners[1], corners[2] = corners[2], corners[1]
+
+        def affine(p: Place, corners: list[Place] = corners) -> Place:
+            weights = (1 - sum(p), *p)
+            return tuple(
+                sum((w * c[k] for w, c in zip(weights, corners, strict=True)), Fraction(0))
+                for k in range(d)
+            )
+
+        yield affine
+
+
+def _distorted(place: Place) -> list[float]:
+    """A smooth map of the unit cube that keeps the ends of the first direction apart."""
+    x = [float(c) for c in place]
+    bend = 0.1 * sum((k + 1) * c * (1 - c) for k, c in enumerate(x))
+    return [1 + c + bend * (0.3 if k == 0 else c) for k, c in enumerate(x)]
+
+
+@dataclass(frozen=True)
+class Held:
+    """Node, number of the name in `Interface.nodal`, and value at the end."""
+
+    node: int
+    field: int
+    value: float
+
+
+def starts(page: Interface) -> list[float]:
+    """Value at rest of each name: that of the page's example at node 1, else zero."""
+    given = dict(page.definition.example)
+    names = page.definition.unknowns
+    return [given.get(names[f.places[0]], 0.0) for f in page.nodal]
+
+
+def held(page: Interface, mesh: Patch) -> list[Held]:
+    """Values held on both ends: of every name that stands at all nodes."""
+    full = [k for k, f in enumerate(page.nodal) if len(f.places) == page.definition.nodes]
+    rest = starts(page)
+    first = full[0] if full else -1
+    pulled = {k: PULL * max(1.0, abs(rest[k])) for k in full if k == first or k not in page.vector}
+    ends = ((mesh.left, dict.fromkeys(full, 0.0)), (mesh.right, pulled))
+    return [
+        Held(node, k, rest[k] + values.get(k, 0.0))
+        for nodes, values in ends
+        for node in nodes
+        for k in full
+    ]
+
+
+def numbers(page: Interface, mesh: Patch) -> dict[tuple[int, int], int]:
+    """Equation of each (node, number of the name), node after node."""
+    there: dict[tuple[int, int], None] = {}
+    for cell in mesh.cells:
+        for node, place in enumerate(cell):
+            there.update(
+                {(place, k): None for k, f in enumerate(page.nodal) if node < len(f.places)}
+            )
+    return {key: n for n, key in enumerate(sorted(there))}

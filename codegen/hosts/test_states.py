@@ -1,0 +1,82 @@
+"""States of an element and what its kernel must say there, for the tests in a host's folder.
+
+The values are those of the outputs that the compiler printed, evaluated in 30 digits: printing, C
+compiler, processor and the calls of the host are tested by them. Derivatives are not: the tests
+compare these with differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import mpmath
+
+from softehl.codegen.abi import Task
+from softehl.codegen.derive.output_entries import Entry
+from softehl.codegen.derive.task_outputs import outputs
+from softehl.codegen.graph.evaluation import State, Walk
+from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.pipeline import KernelSource
+
+DIGITS = 30
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One state and its values; empty where the page does not offer the task.
+
+    tangent: row by row. fields: point by point.
+    """
+
+    state: State
+    energy: list[float]
+    residual: list[float]
+    tangent: list[float]
+    fields: list[float]
+
+    @property
+    def data(self) -> list[float]:
+        """Data of the element, then those of each point."""
+        return [float(v) for row in (self.state.data, *self.state.point_data) for v in row]
+
+
+def sample(page: Interface, kernel: KernelSource, state: State) -> Sample:
+    """The values of all tasks at one state."""
+    # where the loop over the points is written out, their data stand behind those of the element
+    flat = [v for row in (state.data, *state.point_data) for v in row]
+    with mpmath.workdps(DIGITS):
+        walk = Walk(replace(state, data=flat), {})
+        size = len(state.dofs)
+        residual, tangent = [0.0] * size, [0.0] * size**2
+        task = Task.TANGENT if Task.TANGENT in kernel.functions else Task.RESIDUAL
+        for x in _entries(page, kernel, task):
+            value = float(walk.value(x.node))
+            if x.column is None:
+                residual[x.row.position] = value
+            else:
+                tangent[x.row.position * size + x.column.position] = value
+        energy = [float(walk.value(x.node)) for x in _entries(page, kernel, Task.ENERGY)]
+        nodes = [n for _, n in page.definition.fields]
+        fields = [float(walk.at(n, q)) for q in range(page.points) for n in nodes]
+    return Sample(
+        state,
+        energy,
+        residual if task in kernel.functions else [],
+        tangent if task == Task.TANGENT else [],
+        fields if Task.FIELDS in kernel.functions else [],
+    )
+
+
+def _entries(page: Interface, kernel: KernelSource, task: str) -> list[Entry]:
+    """Outputs of the whole element, also of a kernel that is made of functions of a point."""
+    if task not in kernel.functions:
+        return []
+    function = kernel.functions[task]
+    at_point = function.printer == "points"
+    return outputs(page.definition, task) if at_point else function.chosen.entries
+
+
+def samples(page: Interface, kernel: KernelSource, states: Sequence[State]) -> list[Sample]:
+    """The values at several states."""
+    return [sample(page, kernel, s) for s in states]

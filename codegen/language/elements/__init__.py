@@ -1,1 +1,0 @@
-"""Elements: shape functions, quadrature rules and unit cells."""

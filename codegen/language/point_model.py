@@ -1,0 +1,111 @@
+"""A page of fields at one point: values and gradients are the unknowns of a model of their own.
+
+Its residual is the fluxes, its tangent the moduli; nothing of a cell is in it but its dimension.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import sympy as sp
+
+from softehl.codegen.elements.cells import Element
+from softehl.codegen.elements.quadrature import point_rule
+from softehl.codegen.graph.differentiation import gradient
+from softehl.codegen.graph.graph import Input, Node, Op
+from softehl.codegen.graph.traversal import reachable
+from softehl.codegen.language.definition import Component, PointForm, Quantity
+from softehl.codegen.language.errors import NeedsElement
+from softehl.codegen.language.fields import AXISYMMETRIC, Fields, Traced
+from softehl.codegen.language.flatten import Entries
+
+
+class Site(Fields):
+    """Values and gradients are unknowns, densities are per volume and stay what they are."""
+
+    def __init__(self, name: str, cell: Element, geometry: str, doc: str) -> None:
+        super().__init__(name, cell, geometry, 1, point_rule(), doc)
+        self._X = [x[0] for x in self.coordinates(*"XYZ"[: cell.dimension])]
+        self._quantities: list[Quantity] = []
+        self._given_at_point: dict[int, Quantity] = {}
+        self._centroid: dict[int, Node] = {}
+
+    def form(self) -> PointForm:
+        """The finished model with the meaning of its unknowns and data."""
+        d = self.finish()
+        used = set(reachable([d.potential]))
+        directions = tuple(n for n in d.directions if n in used)
+        unknowns = tuple(self._quantities[_index(n)] for n in directions)
+        others = [n for n in directions if _index(n) in self._centroid]
+        varied = gradient(d.graph, d.potential, others, constant=d.constant, given=d.given)
+        if any(varied[n] is not d.graph.zero for n in others):
+            raise NeedsElement("m.centroid of what is varied")
+        d = replace(d, directions=directions)
+        return PointForm(
+            definition=d,
+            unknowns=unknowns,
+            all=tuple(self._quantities),
+            data=dict(self._given_at_point),
+            axisymmetric=self.geometry == AXISYMMETRIC,
+            centroid=self._centroid,
+        )
+
+    def centroid(self, value: Any) -> Any:
+        """See `Fields`: unknowns of their own, where fields and places alone say what they are."""
+        entries, named = Entries.of(value), []
+        for v in entries.values:
+            node = self._symbols.lower(v)
+            met = reachable([node])
+            inputs = [n.payload for n in met if isinstance(n.payload, Input)]
+            known = all(
+                i.array == "coordinates" or (i.array == "dofs" and i.index not in self._centroid)
+                for i in inputs
+            )
+            if not known or any(n.op is Op.CALL for n in met):
+                raise NeedsElement(f"m.centroid({value})")
+            label = f"centroid_{len(self._centroid)}"
+            self._centroid[len(self._quantities)] = node
+            self._quantities.append(Quantity(Component(label, 0), None))
+            named.append(self.unknown(label))
+        return entries.arrange(named)
+
+    def _components_of(self, components: Sequence[Component]) -> list[Traced]:
+        traced = []
+        for component in components:
+            labels = [
+                component.name,
+                *(f"grad_{component.name}_{k}" for k in range(self.dimension)),
+            ]
+            found = [Quantity(component, k) for k in (None, *range(self.dimension))]
+            if component.given:
+                start = len(self._arguments.lists["data"])
+                symbols = self.data(**dict.fromkeys(labels, "at the point"))
+                self._given_at_point.update(enumerate(found, start))
+            else:
+                symbols = [self.unknown(label) for label in labels]
+                self._quantities += found
+            traced.append(Traced(component, symbols[0], tuple(symbols[1:])))
+        return traced
+
+    def _place(self) -> list[Any]:
+        return self._X
+
+    def _volume(self) -> Any:
+        return sp.Integer(1)
+
+    def _total_of(self, name: str, density: Any) -> Any:
+        return self.define(name, density)
+
+    def point_data(self, /, **meanings: str) -> list[sp.Symbol]:
+        """As of any model; here they do not vary, there is one point."""
+        return self._arguments.declare("point data", meanings)
+
+    def _check_use(self, potential: Node) -> None:
+        """Nothing: which values and gradients occur is what is found out here."""
+
+
+def _index(n: Node) -> int:
+    assert isinstance(n.payload, Input)
+    return n.payload.index

@@ -1,0 +1,97 @@
+"""Record of a model page as its SymPy expressions, for the check of its kernels.
+
+A kernel is checked against an evaluation of these expressions that shares neither the conversion
+to a graph nor anything after it (`verify.sympy_program`). The model only records them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import sympy as sp
+
+
+@dataclass(frozen=True)
+class Integral:
+    """Sum over the points of integrand times weight."""
+
+    integrand: Any
+
+
+@dataclass(frozen=True)
+class Local:
+    """Unknown of local equations, or argument of an energy of stretches."""
+
+
+@dataclass(frozen=True)
+class Implicit:
+    """Entry `index` of the solution of equations = 0 for `unknowns`, near `start`."""
+
+    equations: tuple[Any, ...]
+    unknowns: tuple[Any, ...]
+    start: tuple[Any, ...]
+    index: int
+
+
+@dataclass(frozen=True)
+class Principal:
+    """`energy` at the eigenvalues of a symmetric matrix, given by its `entries` row by row."""
+
+    energy: Any
+    squares: tuple[Any, ...]
+    entries: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Slope:
+    """Derivative of `value` by the quantity that a symbol stands for."""
+
+    value: Any
+    by: Any
+
+
+@dataclass
+class Record:
+    """The page: what each name means, potentials with what they freeze, fields, history.
+
+    `inputs` holds array and index of every argument; names not in `meanings` are arguments.
+    """
+
+    meanings: dict[Any, Any] = field(default_factory=dict)
+    inputs: dict[Any, tuple[str, int]] = field(default_factory=dict)
+    potentials: list[tuple[Any, tuple[Any, ...]]] = field(default_factory=list)
+    fields: list[tuple[str, Any]] = field(default_factory=list)
+    history: list[tuple[str, Any]] = field(default_factory=list)
+
+    def define(self, symbol: Any, meaning: Any) -> Any:
+        """Note what a symbol means (the first time counts); returns the symbol."""
+        self.meanings.setdefault(symbol, meaning)
+        return symbol
+
+    def implicit(self, equations: Any, unknowns: Any, start: Any, found: Sequence[Any]) -> None:
+        """Note local unknowns and the names of their solution."""
+        for s in unknowns:
+            self.meanings[s] = Local()
+        for k, s in enumerate(found):
+            self.define(s, Implicit(tuple(equations), tuple(unknowns), tuple(start), k))
+
+    def principal(self, symbol: Any, energy: Any, squares: Any, C: Any) -> Any:
+        """Note an energy of stretches; returns its name."""
+        for s in squares:
+            self.meanings[s] = Local()
+        pairs = [(C[i, j], C[j, i]) for i in range(3) for j in range(3)]
+        entries = tuple(sp.sympify(a if a is b else (a + b) / 2) for a, b in pairs)
+        return self.define(symbol, Principal(energy, tuple(squares), entries))
+
+    def slopes(
+        self, value: Any, by: Sequence[Any], found: Sequence[Any], shared: Sequence[int]
+    ) -> None:
+        """Note the names of derivatives of a value, divided by how many entries share them."""
+        for symbol, s, n in zip(found, by, shared, strict=True):
+            if n == 1:
+                self.define(symbol, Slope(value, s))
+            else:
+                whole = self.define(sp.Dummy(real=True), Slope(value, s))
+                self.define(symbol, whole / n)

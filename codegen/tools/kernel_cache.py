@@ -1,0 +1,300 @@
+"""From models to a folder with their C and the compiled kernels, by way of the user's cache.
+
+Two keys, so that nothing is derived or compiled twice: what the C was derived from (the text of
+the model file or the graph of a definition, the text of this generator, the version of SymPy), and
+what the library was compiled from (the C, the compiler, its flags, the processor, the ABI).
+What else a model has read (a table of constants, a module that it imports by a computed name) is
+stored beside the C with its digest. A model that imports a module of another folder which the
+process had imported before is run every time: that module may be older than its file. Nobody sees
+whether a model asks for the time, its environment, or the names in a folder; `softehl generate`
+runs it in any case.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import Field, dataclass, fields, is_dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from softehl.codegen import abi
+from softehl.codegen.tools import build, model_text
+from softehl.codegen.tools import cache_store as store
+from softehl.codegen.tools.model_text import ModelFileError
+
+if TYPE_CHECKING:
+    from softehl.codegen.graph.graph import Node
+    from softehl.codegen.language.definition import Definition
+    from softehl.codegen.language.material import Law
+    from softehl.codegen.language.weak_form import On, Page
+
+
+Where: TypeAlias = "tuple[tuple[str, ...], str, bool]"
+"""Cells and geometry ("": the usual one) of pages of fields, and whether materials are wanted."""
+
+
+@dataclass(frozen=True)
+class Library:
+    """Files and compiled kernels of some models.
+
+    folder: in the cache; holds `files` and the shared library.  derived, compiled: seconds by
+    kernel; empty where the cache had them.
+    """
+
+    folder: Path
+    files: Mapping[str, str]
+    derived: Mapping[str, float]
+    compiled: Mapping[str, float]
+
+
+def folder_of(
+    source: Path | Definition | Page | Law,
+    where: Where = ((), "", False),
+    *,
+    derivatives: bool = False,
+) -> Path:
+    """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived).
+
+    where: cells and geometry of pages of fields, and whether materials are wanted. derivatives:
+    the kernels of `Definition.for_derivatives` instead.
+    """
+    cells, geometry, materials = where
+    if derivatives:
+        return _for_derivatives(source, where)
+    if not isinstance(source, Path):
+        return library(_definitions(source, where)).folder
+    known = model_text.sources(source)
+    anywhere = _file_key(known)
+    here = _file_key(known, *cells, geometry, "materials" if materials else "")
+    files = (None if materials else store.recall(anywhere)) or store.recall(here)
+    if files is None:
+        from softehl.codegen.language.weak_form import On
+        from softehl.codegen.tools import model_loader
+
+        on = On(cells, geometry or None, materials)
+        found, inputs = model_loader.definitions_and_inputs(source, on)
+        read = inputs.beyond(source, known)
+        key = None if read is None else here if any(d.cell for d in found) else anywhere
+        return library(found, key, read).folder
+    return compiled(files)[0]
+
+
+def _for_derivatives(source: Path | Definition | Page | Law, where: Where) -> Path:
+    """Folder of the kernels of what derivatives of results are made of."""
+    cells, geometry, materials = where
+    key, read = None, None
+    if isinstance(source, Path):
+        told = geometry, "materials" if materials else "", "derivatives"
+        known = model_text.sources(source)
+        key = _file_key(known, *cells, *told)
+        files = store.recall(key)
+        if files is not None:
+            return compiled(files)[0]
+        from softehl.codegen.language.weak_form import On
+        from softehl.codegen.tools import model_loader
+
+        on = On(cells, geometry or None, materials)
+        found, inputs = model_loader.definitions_and_inputs(source, on)
+        read = inputs.beyond(source, known)
+        key = None if read is None else key
+    else:
+        found = _definitions(source, where)
+    free = [d for d in found if not d.given]
+    if not free:
+        names = ", ".join(d.name for d in found)
+        raise ModelFileError(f"{names}: gives derivatives of its own, and results have none by it")
+    return library([d.for_derivatives() for d in free], key, read).folder
+
+
+def of_law(name: str, where: Where, *, derivatives: bool = False) -> Path:
+    """Folder of the kernels of a material that ships; raises ValueError for another name."""
+    cells, geometry, _ = where
+    key = store.digest("law", generator(), name, *cells, geometry, str(derivatives))
+    files = store.recall(key)
+    if files is not None:
+        return compiled(files)[0]
+    from softehl.codegen.models.material_elements import law
+
+    found = _definitions(law(name), where)
+    return library([d.for_derivatives() if derivatives else d for d in found], key).folder
+
+
+def _definitions(source: Definition | Page | Law, where: Where) -> list[Definition]:
+    from softehl.codegen.language.material import Law
+    from softehl.codegen.language.weak_form import On, Page
+    from softehl.codegen.tools import model_loader
+
+    cells, geometry, _ = where
+    if isinstance(source, Law):
+        source = source.page()
+    if isinstance(source, Page):
+        with model_loader.errors_of(source):
+            return source.definitions(On(cells, geometry or None))
+    return [source]
+
+
+def of_files(paths: Sequence[Path], on: On | None = None) -> tuple[list[Definition], Library]:
+    """The models of some files, which are run, and their library."""
+    from softehl.codegen.language.weak_form import NOWHERE
+    from softehl.codegen.tools import model_loader
+
+    on = on or NOWHERE
+    known = [model_text.sources(p) for p in paths]
+    runs = [model_loader.definitions_and_inputs(p, on) for p in paths]
+    found = [d for definitions, _ in runs for d in definitions]
+    model_loader.check_names(" ".join(p.name for p in paths), found)
+    if len(paths) > 1:
+        return found, library(found, check=False)
+    read = runs[0][1].beyond(paths[0], known[0])
+    key = None if read is None else _file_key(known[0], *on.told())
+    return found, library(found, key, read, check=False)
+
+
+def library(
+    definitions: Sequence[Definition],
+    key: str | None = None,
+    read: Mapping[str, str] | None = None,
+    *,
+    check: bool = True,
+) -> Library:
+    """The library of some models; what was derived is remembered under `key` as well.
+
+    read: as in `cache.remember`. check: with the quick check of kernels that have not been through
+    it (`verify.quick_check`).
+    """
+    files, derived = derive(definitions)
+    folder, seconds = compiled(files)
+    if check:
+        _checked(definitions, files, folder)
+    if key is not None:
+        store.remember(key, files, read)
+    return Library(folder, files, derived, seconds)
+
+
+def _checked(definitions: Sequence[Definition], files: Mapping[str, str], folder: Path) -> None:
+    """Check kernels once for each text of theirs; raises `quick.WrongKernelError`."""
+    passed = store.digest("checked", generator(), store.content(files))
+    if store.recall(passed) is not None:
+        return
+    from softehl.codegen.verify import quick_check
+
+    kernels = json.loads(files["manifest.json"])["kernels"]
+    for d in definitions:
+        quick_check.check(d, list(kernels[d.name]["tasks"]), folder / build.LIBRARY)
+    store.remember(passed, {"checked": ""})
+
+
+def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str, float]]:
+    """Every generated file, and seconds by kernel (empty if they were remembered)."""
+    key = store.digest("models", generator(), *(fingerprint(d) for d in definitions))
+    files = store.recall(key)
+    if files is not None:
+        return files, {}
+    from softehl.codegen import pipeline
+    from softehl.codegen.tools import output_files
+
+    kernels, seconds = [], {}
+    for d in definitions:
+        start = perf_counter()
+        try:
+            kernels.append(pipeline.compile_model(d))
+        except ZeroDivisionError:
+            raise ModelFileError(
+                f"{d.name}: something is divided by a value that is always zero, or a root of it "
+                "is differentiated"
+            ) from None
+        seconds[d.name] = perf_counter() - start
+    files = output_files.files(kernels)
+    store.remember(key, files)
+    return files, seconds
+
+
+def compiled(files: Mapping[str, str], *, keep: bool = False) -> tuple[Path, dict[str, float]]:
+    """The folder of these files and their library, and seconds by kernel (empty if cached).
+
+    keep: as in `cache.folder`.
+    """
+    content = store.content(files)
+    flags, told = build.tuned()
+    key = store.digest(content, str(abi.VERSION), told)
+    seconds: dict[str, float] = {}
+
+    def complete(folder: Path) -> bool:
+        return build.intact(folder) and _content_of(folder, files) == content
+
+    def make(folder: Path) -> None:
+        for name, text in files.items():
+            store.write(folder / name, text.encode(), mode=0o644)
+        seconds.update(build.build(folder, flags=flags))
+
+    return store.folder(key, complete, make, keep=keep), seconds
+
+
+def _content_of(folder: Path, files: Mapping[str, str]) -> str | None:
+    try:
+        return store.content({n: (folder / n).read_text(encoding="utf-8") for n in files})
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+def _file_key(texts: Mapping[str, str], *on: str) -> str:
+    return store.digest("file", generator(), model_text.digest(texts), *on)
+
+
+_CODEGEN = Path(__file__).parents[1]
+
+
+@cache
+def generator() -> str:
+    """Digest of the generator itself: its text and the versions of what it computes with."""
+    texts = [p.read_text(encoding="utf-8") for p in sorted(_CODEGEN.rglob("*.py"))]
+    return store.digest(*texts, *(version(p) for p in ("sympy", "mpmath")))
+
+
+def fingerprint(definition: Definition) -> str:
+    """Digest of everything that a definition says, its graphs included."""
+    return store.digest(_told(definition), _told(definition.point))
+
+
+def _told(value: Any) -> str:
+    """A record as text: its nodes, numbered from operands to users, then its entries."""
+    from softehl.codegen.graph.graph import Routine
+    from softehl.codegen.graph.traversal import reachable
+
+    roots: list[Node] = []
+    _entries(value, lambda n: roots.append(n) or "")  # type: ignore[func-returns-value]
+    place = {n: f"#{k}" for k, n in enumerate(reachable(roots))}
+    lines = []
+    for n in place:
+        payload = _told(n.payload) if isinstance(n.payload, Routine) else repr(n.payload)
+        lines.append(f"{n.op} {[place[a] for a in n.args]} {payload} {n.varying}")
+    return "\n".join([*lines, _entries(value, place.__getitem__)])
+
+
+def _counts(f: Field[Any]) -> bool:
+    return f.compare and f.name[0] != "_"
+
+
+def _entries(value: Any, shown: Callable[[Node], str]) -> str:
+    """A value as text, nodes as `shown`.
+
+    Fields that a record keeps for itself (_name) or does not compare are left out.
+    """
+    from softehl.codegen.graph.graph import Graph, Node
+
+    if isinstance(value, Node):
+        return shown(value)
+    if isinstance(value, Mapping):
+        inside = [f"{_entries(k, shown)}: {_entries(v, shown)}" for k, v in value.items()]
+    elif isinstance(value, (tuple, list)):
+        inside = [_entries(v, shown) for v in value]
+    elif is_dataclass(value):
+        named = {f.name: getattr(value, f.name) for f in fields(value) if _counts(f)}
+        inside = [type(value).__name__, _entries(named, shown)]
+    else:
+        return "" if isinstance(value, Graph) else repr(value)
+    return f"({', '.join(inside)})"

@@ -1,0 +1,92 @@
+"""The compiled kernels of one family, called through ctypes on a batch of states."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import random
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from softehl.codegen import abi
+from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.graph import Op
+from softehl.codegen.graph.traversal import reachable
+from softehl.codegen.language.definition import Definition
+
+Vector = list[float]
+
+
+class Batch:
+    """The kernels of one family called on all states at once."""
+
+    def __init__(
+        self, d: Definition, library: Any, states: Sequence[State], along: Sequence[Vector]
+    ) -> None:
+        self.d, self.library, self.states = d, library, states
+        first = states[0]
+        self.ndof, self.points = len(first.dofs), len(first.rule)
+        flat = [v for point in first.basis for pair in point for v in pair]
+        self.arrays = [
+            _doubles(v for s in states for v in s.coordinates),
+            _doubles(v for s in states for v in s.dofs),
+            _doubles(v for s in states for row in (s.data, *s.point_data) for v in row),
+            _doubles(first.parameters),
+            _doubles(()),
+            _doubles(v for row in first.rule for v in row),
+            _doubles(flat),
+        ]
+        self.along = along
+        self.modes = len(first.basis[0]) if first.basis else 0
+
+    def call(self, task: str) -> tuple[list[Vector], list[Vector]]:
+        """Values and, of the task `tangent`, tangents of every state, flat."""
+        (wide, values), (square, tangent), run = self.prepared(task)
+        run()
+        n = len(self.states)
+        return _split(values, wide, n), _split(tangent, square, n)
+
+    def prepared(self, task: str) -> tuple[Any, Any, Callable[[], None]]:
+        """Width and array of values and of tangents, and the call that fills them."""
+        fields = self.points * len(self.d.fields)
+        width = {abi.Task.ENERGY: 1, **dict.fromkeys(abi.AT_POINTS, fields)}
+        wide = width.get(abi.Task(task), self.ndof) if task in set(abi.Task) else self.ndof
+        square = self.ndof**2 if task == abi.Task.TANGENT else 0
+        n = len(self.states)
+        values, tangent = _doubles([math.nan] * n * wide), _doubles([math.nan] * n * square)
+        function = getattr(self.library, abi.function_name(self.d.name, task))
+        function.restype = None
+        sizes = (ctypes.c_ssize_t(v) for v in (n, self.points, self.modes))
+        self.arrays[4] = _doubles(v for e in range(n) for v in self.direction(task, e))
+        arguments = (*sizes, *self.arrays, values, tangent)
+        return (wide, values), (square, tangent), lambda: function(*arguments)
+
+    def direction(self, task: str, e: int) -> Vector:
+        """Direction of a task in one element: its unknowns, or a random variation of all else."""
+        if task not in (abi.Task.PSEUDO_LOAD, abi.Task.FIELDS_RATE):
+            return self.along[e]
+        state = self.states[e]
+        rng = random.Random(f"{self.d.name} variation {e}")
+        sizes = [len(state.coordinates), len(state.data), len(state.parameters)]
+        values = [*state.coordinates, *state.data, *state.parameters]
+        varied = [rng.uniform(-1, 1) * abs(float(v)) for v in values[: sum(sizes)]]
+        return varied + (self.along[e] if task == abi.Task.FIELDS_RATE else [])
+
+    def silent(self, task: str, *, first: bool = False) -> bool:
+        """True if a model with routines is not-a-number in a whole element, which says no.
+
+        In any element, or in the first one.
+        """
+        if all(n.op is not Op.CALL for n in reachable([self.d.potential])):
+            return False
+        values = self.call(task)[0]
+        return any(all(map(math.isnan, v)) for v in (values[:1] if first else values))
+
+
+def _doubles(values: Iterable[Any]) -> Any:
+    numbers = [float(v) for v in values]
+    return (ctypes.c_double * max(len(numbers), 1))(*numbers)
+
+
+def _split(values: Any, width: int, n: int) -> list[Vector]:
+    return [list(values[width * e : width * (e + 1)]) for e in range(n)]

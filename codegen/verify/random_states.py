@@ -1,0 +1,184 @@
+"""Random admissible states of one element of any model, for checking its kernel.
+
+Without further words: nodes on the unit cell (a line, square, cube, triangle, tetrahedron, moved
+by 1 from every axis, so that it is a ring in axisymmetry too) and slightly off it, unknowns of a
+few per cent, parameters and data (of points, too) about 1.  Values of a model's `example` are used
+instead, also varied by a few per cent.  A state is admissible if the potential and the fields are
+real numbers there: no logarithm or root of something negative, no division by zero.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import mpmath
+from mpmath.libmp import NoConvergence
+
+from softehl.codegen.elements.cells import ELEMENTS
+from softehl.codegen.graph.evaluation import State, Walk
+from softehl.codegen.graph.graph import BOOLEAN, Node, Op, Routine
+from softehl.codegen.graph.traversal import reachable
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.verify.arithmetics import Doubles
+from softehl.codegen.verify.reference_evaluator import Evaluator
+from softehl.codegen.verify.sympy_program import program
+from softehl.errors import SoftehlError
+
+ATTEMPTS = 40
+DIGITS = 30
+SPREAD = 0.05
+"""Size of the random unknowns, and of the relative variation of what is given."""
+
+CELLS: dict[tuple[int, int], tuple[tuple[float, ...], ...]] = {
+    **{(1, k): ((0,) * k,) for k in (1, 2, 3)},
+    **{(2, k): ((0,) * k, (1,) + (0,) * (k - 1)) for k in (1, 2, 3)},
+    **{(3, k): ((0,) * k, (1,) + (0,) * (k - 1), (0.5,) + (0,) * (k - 1)) for k in (1, 2)},
+}
+"""Unit cells of elements without an integral, by number of nodes and of coordinates."""
+
+
+def unit_cell(d: Definition) -> tuple[tuple[float, ...], ...] | None:
+    """Places of the nodes of the element that a model is written for, between 0 and 1."""
+    width = len(d.coordinates)
+    for kind in ELEMENTS.values():
+        if (len(kind.nodes), kind.dimension) == (d.nodes, d.rule.dimension) and width:
+            low, size = min(min(p) for p in kind.nodes), max(map(max, kind.nodes))
+            places = [[float((c - low) / (size - low)) for c in place] for place in kind.nodes]
+            return tuple(tuple((p + [0.0] * width)[:width]) for p in places)
+    return CELLS.get((d.nodes, width))
+
+
+class NoStateError(SoftehlError, ValueError):
+    """No admissible state of a model was found; the message says what the model must give."""
+
+
+def admissible(definition: Definition, count: int) -> list[State]:
+    """`count` random admissible states with the same parameters, the same ones in every run.
+
+    Raises `NoStateError`, with what to say in the model, if there are none.
+    """
+    rng = random.Random(definition.name)
+    evaluator = Evaluator(program(definition), Doubles())
+    found: list[State] = []
+    for attempt in range(ATTEMPTS + count):
+        state = draw(definition, rng, attempt)
+        if found:  # the states of a call share its parameters
+            state = replace(state, parameters=found[0].parameters)
+        if evaluator.at(state).real():
+            found.append(state)
+        if len(found) == count:
+            break
+    else:
+        name = fault(definition, draw(definition, random.Random(definition.name), ATTEMPTS))
+        raise NoStateError(
+            f"{definition.name} cannot be checked: {name or 'it'} has no real value at "
+            "random states near the undeformed element with parameters about 1; say where it has "
+            f"one, e.g. m.example({suggestion(definition)})"
+        )
+    return found
+
+
+def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
+    """One random state; the later the attempt, the smaller the variation."""
+    spread = SPREAD * 0.93 ** min(attempt, ATTEMPTS)
+    given = dict(d.example)
+
+    def vary(value: float) -> float:
+        return value + spread * (abs(value) or 1.0) * rng.uniform(-1, 1)
+
+    def about_one(name: str) -> float:
+        return vary(given[name]) if name in given else rng.uniform(0.5, 1.5)
+
+    unknowns = [*d.unknowns, *(name for name in _fields(d) for _ in range(2))]
+    dofs = [vary(given[n]) if n in given else spread * rng.uniform(-1, 1) for n in unknowns]
+    rule = _rule(d)
+    return State(
+        coordinates=_coordinates(d, rng, spread),
+        dofs=dofs,
+        data=[about_one(a.name) for a in d.data],
+        parameters=[about_one(a.name) for a in d.parameters],
+        rule=rule,
+        basis=[_linear(float(p[0]), len(_fields(d))) for p in rule] if d.interpolated else (),
+        point_data=[[about_one(a.name) for a in d.point_data] for _ in rule],
+    )
+
+
+def _coordinates(d: Definition, rng: random.Random, spread: float) -> list[float]:
+    given = dict(d.example)
+    corners = unit_cell(d)
+    out = []
+    for a in range(d.nodes):
+        for c, name in enumerate(d.coordinates):
+            label = f"{name}{a + 1}"
+            if label in given:
+                place = given[label]
+            elif corners is None:
+                raise NoStateError(
+                    f"{d.name} cannot be checked: no cell of {d.nodes} nodes in "
+                    f"{len(d.coordinates)} coordinates is known; say where the nodes may be: "
+                    f"m.example({label}=...)"
+                )
+            else:
+                place = 1 + corners[a][c]
+            out.append(place + spread * rng.uniform(-1, 1))
+    return out
+
+
+def _rule(d: Definition) -> list[tuple[float, ...]]:
+    pairs = zip(d.rule.points, d.rule.weights, strict=True)
+    return [tuple(float(v) for v in (*p, w)) for p, w in pairs]
+
+
+def _fields(d: Definition) -> list[str]:
+    """Names of the interpolated fields."""
+    return d.interpolated.split(", ") if d.interpolated else []
+
+
+def _linear(xi: float, fields: int) -> list[tuple[float, ...]]:
+    """Values and slopes of the two linear shape functions of each field, zero for the others."""
+    shapes = ((1 - xi) / 2, -0.5), ((1 + xi) / 2, 0.5)
+    none = (0.0, 0.0)
+    return [
+        (*none * k, *shape, *none * (fields - 1 - k)) for k in range(fields) for shape in shapes
+    ]
+
+
+def fault(definition: Definition, state: State) -> str | None:
+    """The first operation without a real value at a state; None if everything has one."""
+    return first_fault([definition.potential, *(n for _, n in definition.fields)], state)
+
+
+def first_fault(roots: Sequence[Node], state: State) -> str | None:
+    """The first operation below `roots` without a real value at a state."""
+    with mpmath.workdps(DIGITS):
+        walk = Walk(state, {})
+        bad = [n for n in roots if not _real(walk, n, state)]
+        nodes = (n for n in reachable(bad) if n.op not in (*BOOLEAN, Op.CALL))
+        first = next((n for n in nodes if not _real(walk, n, state)), None)
+    return None if first is None else _described(first)
+
+
+def _described(n: Node) -> str:
+    """An operation and the last named quantity that it uses, for the author of the model."""
+    if n.op is Op.ITEM and isinstance(n.args[0].payload, Routine):
+        return n.args[0].payload.name
+    names = [str(a.payload) for a in reachable(n.args) if a.op is Op.NAME]
+    return f"{n.op}(.. {names[-1]} ..)" if names else str(n.op)
+
+
+def _real(walk: Walk, n: Node, state: State) -> bool:
+    try:
+        values: list[Any] = [walk.at(n, q) for q in range(len(state.rule) if n.varying else 1)]
+    except (ArithmeticError, ValueError, TypeError, NoConvergence):
+        # TypeError: complex numbers have no order
+        return False
+    return all(isinstance(v, mpmath.mpf) and mpmath.isfinite(v) for v in values)
+
+
+def suggestion(d: Definition) -> str:
+    """Arguments of `example` that a model may need."""
+    names = [a.name for a in (*d.parameters, *d.data, *d.point_data)] or list(d.unknowns[:2])
+    return ", ".join(f"{n}=..." for n in names)

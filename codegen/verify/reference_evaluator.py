@@ -1,0 +1,493 @@
+"""Values and derivatives of a page as written, in one of the arithmetics of `arithmetics`.
+
+Derivatives are central differences of values: the residual that of the potential with the frozen
+quantities held, the tangent that of the residual. Local equations are solved by Newton's method
+with differences for slopes. Nothing of the compiler is used.
+
+A value that is not real is None, and so is what needs it; the side of a branch that is not taken
+may be None.
+
+`Page` has the results of the tasks of a kernel, by differences of these values.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import localcontext
+from functools import wraps
+from time import perf_counter
+from typing import Any, ParamSpec, TypeVar
+
+import mpmath
+from mpmath.libmp import NoConvergence
+
+from softehl.codegen.graph.evaluation import State
+from softehl.codegen.verify.arithmetics import CONTEXT, DIGITS, UNIT, Exact, Function, Number
+from softehl.codegen.verify.sympy_program import Program, Step
+
+Vector = list[Number]
+Row = list[Any]
+NOT_REAL = (ArithmeticError, ValueError, TypeError, NoConvergence)
+ITERATIONS = 60
+"""Newton steps after which a local iteration has no solution."""
+
+
+class OutOfTimeError(Exception):
+    """The evaluation was ended at its deadline."""
+
+
+class NotRealError(ArithmeticError):
+    """The page has no real value at a state."""
+
+
+@dataclass(frozen=True)
+class Operation:
+    """A step with the function of its operands; None: a step with an evaluation of its own."""
+
+    step: Step
+    function: Function | None
+
+
+class Evaluator:
+    """A program in one arithmetic."""
+
+    def __init__(self, program: Program, arithmetic: Exact, deadline: float = float("inf")) -> None:
+        self.program, self.arithmetic, self.deadline = program, arithmetic, deadline
+        self._operations: dict[int, Operation] = {}
+        self._inner: dict[int, list[Operation]] = {}
+        self._chosen: dict[Any, list[Operation]] = {}
+        slots = [slot for slot, _ in program.potentials]
+        self.order = self.operations(program.above([*slots, *program.fields]))
+
+    def operations(self, steps: Sequence[Step]) -> list[Operation]:
+        """The steps with their functions."""
+        for s in steps:
+            if s.slot not in self._operations:
+                self._operations[s.slot] = Operation(s, _function(s, self.arithmetic))
+        return [self._operations[s.slot] for s in steps]
+
+    def inner(self, s: Step) -> list[Operation]:
+        """The operations inside a step."""
+        if s.slot not in self._inner:
+            self._inner[s.slot] = self.operations(s.inner)
+        return self._inner[s.slot]
+
+    def depending(self, arrays: frozenset[str], roots: tuple[int, ...]) -> list[Operation]:
+        """The operations that `roots` need and that depend on some arrays."""
+        key = (arrays, roots)
+        if key not in self._chosen:
+            steps = self.program.above(roots)
+            self._chosen[key] = self.operations([s for s in steps if s.depends & arrays])
+        return self._chosen[key]
+
+    def at(self, state: State) -> Evaluation:
+        """All values at a state."""
+        points = len(state.rule)
+        made = Evaluation(self, state, [[None] * len(self.program.steps) for _ in range(points)])
+        made.run(self.order)
+        return made
+
+
+def _function(s: Step, n: Exact) -> Function | None:
+    """Function of the operands of a step."""
+    plain: dict[str, Function] = {
+        "<": operator.lt,
+        "<=": operator.le,
+        ">": operator.gt,
+        ">=": operator.ge,
+        "==": operator.eq,
+        "!=": operator.ne,
+        "not": operator.not_,
+        "and": _all,
+        "or": _any,
+        "pieces": _pieces,
+        "choice": lambda c, a, b: a if _known(c) else b,
+        "max": max,
+        "min": min,
+        "abs": abs,
+        "sign": lambda a: n.number((a > 0) - (a < 0)),
+        "heaviside": lambda a, at: at if a == 0 else n.number(int(a > 0)),
+        "same": lambda a: a,
+        "item": lambda solution: solution[s.content],
+    }
+    if s.name in plain:
+        return plain[s.name]
+    match s.name:
+        case "sum":
+            return n.sum(s.slot, len(s.args))
+        case "product":
+            return n.product(s.slot, len(s.args))
+        case "fixed power":
+            return n.settled(s.slot, _fixed_power(n, s.content))
+        case "power":
+            return n.settled(s.slot, n.power)
+        case "arctangent":
+            return n.settled(s.slot, n.arctangent)
+    return n.settled(s.slot, n.functions[s.name]) if s.name in n.functions else None
+
+
+def _fixed_power(n: Exact, e: Any) -> Function:
+    top, bottom = e.numerator, e.denominator
+    if bottom == 1:
+        return (lambda a: 1 / a ** (-top)) if top < 0 else lambda a: a**top
+    if bottom == 2:
+        root = n.functions["sqrt"]
+        return (lambda a: 1 / root(a) ** -top) if top < 0 else lambda a: root(a) ** top
+    exponent = n.number(e)
+    return lambda a: n.power(a, exponent)
+
+
+def _known(condition: bool | None) -> bool:
+    if condition is None:
+        raise NotRealError
+    return condition
+
+
+def _all(*conditions: bool | None) -> bool:
+    return False not in conditions and all(map(_known, conditions))
+
+
+def _any(*conditions: bool | None) -> bool:
+    return True in conditions or any(map(_known, conditions))
+
+
+def _pieces(*pairs: Any) -> Number:
+    for condition, value in zip(pairs[::2], pairs[1::2], strict=True):
+        if _known(condition):
+            return value
+    raise NotRealError
+
+
+class Evaluation:
+    """All values of a program at one state, a row of them for each point."""
+
+    def __init__(self, evaluator: Evaluator, state: State, rows: list[Row]) -> None:
+        self.evaluator, self.state, self.rows = evaluator, state, rows
+        n = evaluator.arithmetic
+        self.arrays: dict[str, Vector] = {
+            "coordinates": [n.number(v) for v in state.coordinates],
+            "dofs": [n.number(v) for v in state.dofs],
+            "data": [n.number(v) for v in state.data],
+            "parameters": [n.number(v) for v in state.parameters],
+        }
+        self.solved: dict[tuple[int, int], tuple[Vector, list[Vector]]] = {}
+        self.frozen: frozenset[int] = frozenset()
+
+    # values -------------------------------------------------------------------------------------
+
+    def run(self, operations: Sequence[Operation], only: int | None = None) -> None:
+        """Compute these operations at all points, or only one."""
+        rows = self.rows if only is None else self.rows[only : only + 1]
+        for o in operations:
+            s = o.step
+            if perf_counter() > self.evaluator.deadline:
+                raise OutOfTimeError
+            if s.slot in self.frozen:
+                continue
+            for q, row in enumerate(rows):
+                if q and not s.varying:
+                    row[s.slot] = rows[0][s.slot]
+                    continue
+                try:
+                    if o.function is None:
+                        row[s.slot] = self._special(s, row, q if only is None else only)
+                    else:
+                        row[s.slot] = o.function(*[row[a] for a in s.args])
+                except NOT_REAL:
+                    row[s.slot] = None
+
+    def _special(self, s: Step, row: Row, q: int) -> Any:
+        n = self.evaluator.arithmetic
+        match s.name:
+            case "input":
+                return n.settled(s.slot, self._input)(*s.content, q)
+            case "number":
+                if s.content in ("pi", "e"):
+                    return n.pi() if s.content == "pi" else n.functions["exp"](n.number(1))
+                exact = isinstance(s.content, bool)
+                return s.content if exact else n.settled(s.slot, n.number)(s.content)
+            case "integral":
+                return self._integral(s)
+            case "solve":
+                return self._solve(s, row, q)
+            case "slope":
+                return self._slope(s, q)
+            case "stretches":
+                own, energy = s.content
+                found = n.eigenvalues([row[a] for a in s.args])
+                return self._with(s, q, own, found, (energy,))[0]
+        return None
+
+    def _input(self, array: str, index: int, q: int) -> Number:
+        number = self.evaluator.arithmetic.number
+        if array == "rule":
+            return number(self.state.rule[q][index])
+        if array == "point data":
+            return number(self.state.point_data[q][index])
+        if array == "interpolated":
+            modes = self.state.basis[q]
+            unknowns = self.arrays["dofs"][-len(modes) :]
+            pairs = zip(modes, unknowns, strict=True)
+            return sum(number(b[index]) * p for b, p in pairs)
+        return self.arrays[array][index]
+
+    def _integral(self, s: Step) -> Number:
+        n = self.evaluator.arithmetic
+        weights = [n.number(point[-1]) for point in self.state.rule]
+        terms = [row[s.args[0]] * w for row, w in zip(self.rows, weights, strict=True)]
+        return n.sum(s.slot, len(terms))(*terms)
+
+    def _with(
+        self, s: Step, q: int, slots: Sequence[int], values: Vector, wanted: Sequence[int]
+    ) -> Vector:
+        """Values of `wanted` if `slots` of point q have other values, by the inner operations."""
+        inner = self.evaluator.inner(s)
+        whole = any(o.step.name == "integral" for o in inner)
+        rows = self.rows if whole else self.rows[q : q + 1]
+        kept = [[row[o.step.slot] for o in inner] for row in rows]
+        before = [[row[k] for k in slots] for row in rows]
+        held, self.frozen = self.frozen, frozenset(slots)
+        try:
+            for k, v in zip(slots, values, strict=True):
+                shared = whole and not self.evaluator.program.steps[k].varying
+                for row in rows if shared else [self.rows[q]]:
+                    row[k] = v
+            self.run(inner, None if whole else q)
+            return [self.rows[q][k] for k in wanted]
+        finally:
+            self.frozen = held
+            for row, old, given in zip(rows, kept, before, strict=True):
+                for o, v in zip(inner, old, strict=True):
+                    row[o.step.slot] = v
+                for k, v in zip(slots, given, strict=True):
+                    row[k] = v
+
+    def _slope(self, s: Step, q: int) -> Number:
+        value, by = s.args
+        if value == by:
+            return self.evaluator.arithmetic.number(1)
+        if not s.inner:
+            return self.evaluator.arithmetic.number(0)
+        h, x = self.evaluator.arithmetic.step, self.rows[q][by]
+        plus, minus = (self._with(s, q, (by,), [x + t * h], (value,))[0] for t in (1, -1))
+        return (plus - minus) / (2 * h)
+
+    def largest(self) -> Number:
+        """Largest part of a potential: what the digits of a difference are counted from."""
+        steps, found = self.evaluator.program.steps, []
+        for slot, _ in self.evaluator.program.potentials:
+            parts = [a for a in steps[slot].args if steps[slot].name in ("sum", "integral")]
+            found += [self.value(k, q) for k in (slot, *parts) for q in range(len(self.rows))]
+        return max(map(abs, found))
+
+    def real(self) -> bool:
+        """True if potentials and fields have real values."""
+        page = self.evaluator.program
+        try:
+            for slot, _ in page.potentials:
+                self.value(slot)
+            for q in range(len(self.rows)):
+                for slot in page.fields:
+                    self.value(slot, q)
+        except NotRealError:
+            return False
+        return True
+
+    def value(self, slot: int, q: int = 0) -> Number:
+        """A value; `NotRealError` if there is none."""
+        v = self.rows[q][slot]
+        if v is None or isinstance(v, bool):
+            raise NotRealError
+        return v
+
+    # local equations ----------------------------------------------------------------------------
+
+    def _solve(self, s: Step, row: Row, q: int) -> Vector:
+        unknowns, equations = s.content
+        n = self.evaluator.arithmetic
+
+        def residual(values: Vector) -> Vector:
+            return self._with(s, q, unknowns, values, equations)
+
+        found, inverse = self.solved.get((s.slot, q), ([row[a] for a in s.args], None))
+        changed: Number = None
+        for _ in range(ITERATIONS):
+            inverse = inverse or _inverse(_slopes(residual, found, n.coarse))
+            g = residual(found)
+            step = [sum(a * b for a, b in zip(line, g, strict=True)) for line in inverse]
+            found = [v - d for v, d in zip(found, step, strict=True)]
+            size, before = max(map(abs, found)), changed
+            changed = max(map(abs, step))
+            least = n.near * (size or 1)
+            if changed <= least or (before is not None and 2 * changed > before <= 10**6 * least):
+                self.solved[s.slot, q] = found, inverse
+                return found
+            if changed > n.close * size:
+                inverse = None
+        raise NotRealError
+
+    # moved states -------------------------------------------------------------------------------
+
+    def moved(
+        self,
+        moves: Mapping[str, Vector],
+        roots: tuple[int, ...],
+        frozen: Sequence[int] = (),
+    ) -> Evaluation:
+        """Values of `roots` where arrays have moved, what is `frozen` held; all others are old."""
+        made = Evaluation.__new__(Evaluation)
+        made.evaluator, made.state = self.evaluator, self.state
+        made.rows = [list(row) for row in self.rows]
+        made.solved, made.frozen = dict(self.solved), frozenset(frozen)
+        made.arrays = {
+            k: [a + b for a, b in zip(v, moves[k], strict=True)] if k in moves else v
+            for k, v in self.arrays.items()
+        }
+        made.run(self.evaluator.depending(frozenset(moves), roots))
+        return made
+
+
+def _slopes(residual: Callable[[Vector], Vector], at: Vector, h: Number) -> list[Vector]:
+    columns = []
+    for j in range(len(at)):
+        plus, minus = (residual([v + t * h * (i == j) for i, v in enumerate(at)]) for t in (1, -1))
+        columns.append([(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)])
+    return [list(line) for line in zip(*columns, strict=True)]
+
+
+def _inverse(A: list[Vector]) -> list[Vector]:
+    """Gauss and Jordan with partial pivoting."""
+    n = len(A)
+    rows = [[*line, *(int(i == j) for j in range(n))] for i, line in enumerate(A)]
+    for k in range(n):
+        pivot = max(range(k, n), key=lambda i: abs(rows[i][k]))
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        rows[k] = [v / rows[k][k] for v in rows[k]]
+        for i in range(n):
+            if i != k:
+                rows[i] = [a - rows[i][k] * b for a, b in zip(rows[i], rows[k], strict=True)]
+    return [line[n:] for line in rows]
+
+
+Along = Sequence[Sequence[float]]
+
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def _in_digits(function: Callable[P, T]) -> Callable[P, T]:
+    @wraps(function)
+    def inside(*args: P.args, **named: P.kwargs) -> T:
+        with localcontext(CONTEXT), mpmath.workdps(DIGITS):
+            return function(*args, **named)
+
+    return inside
+
+
+class Page:
+    """The page at one state; `exact.NotRealError` where it has no real value.
+
+    Every result is that of a task; `along` are combinations of rows.
+    """
+
+    @_in_digits
+    def __init__(self, evaluator: Evaluator, state: State) -> None:
+        self.evaluator, self.state = evaluator, state
+        self.program = evaluator.program
+        self.here = evaluator.at(state)
+
+    @_in_digits
+    def energy(self) -> Number:
+        """Sum of the potentials."""
+        return sum(self.here.value(slot) for slot, _ in self.program.potentials)
+
+    @_in_digits
+    def fields(self) -> list[Vector]:
+        """Fields, [point][field]."""
+        return self._fields(self.here)
+
+    @_in_digits
+    def residual(self, along: Along) -> Vector:
+        """Combinations of the residual."""
+        return self._residual(self.here, along)
+
+    @_in_digits
+    def rate(self, array: str, direction: Sequence[float], along: Along) -> Vector:
+        """Derivative of the residual along a variation of one array; of the dofs: the product."""
+        return self._rate({array: self._numbers(direction)}, along)
+
+    @_in_digits
+    def pseudo_load(self, direction: Sequence[float], along: Along) -> Vector:
+        """Derivative of the residual along a variation of coordinates, data and parameters."""
+        return self._rate(self._split(direction), along)
+
+    @_in_digits
+    def fields_rate(self, direction: Sequence[float]) -> list[Vector]:
+        """Derivative of the fields, [point][field], along a variation that ends with the dofs."""
+        moves, h = self._split(direction), self.evaluator.arithmetic.step
+        roots = tuple(self.program.fields)
+        plus, minus = (self._fields(self.here.moved(_times(moves, t * h), roots)) for t in (1, -1))
+        return [
+            [(a - b) / (2 * h) for a, b in zip(*rows, strict=True)]
+            for rows in zip(plus, minus, strict=True)
+        ]
+
+    @_in_digits
+    def noise(self, order: int) -> float:
+        """Error of a derivative of this order by differences: digits that cancel."""
+        n = self.evaluator.arithmetic
+        return float(self.here.largest() * n.near / n.step**order)
+
+    @_in_digits
+    def rounding(self, order: int, changes: float) -> float:
+        """Error of a derivative of this order by the unknowns if the potential is rounded once.
+
+        The page is taken to change so many times within the size of the unknowns.
+        """
+        size = max(abs(float(u)) for u in self.state.dofs) or 1.0
+        return UNIT * float(self.here.largest()) * (changes / size) ** order
+
+    def _numbers(self, values: Sequence[float]) -> Vector:
+        return [self.evaluator.arithmetic.number(v) for v in values]
+
+    def _split(self, direction: Sequence[float]) -> dict[str, Vector]:
+        moves, rest = {}, self._numbers(direction)
+        for array in ("coordinates", "data", "parameters", "dofs"):
+            size = len(getattr(self.state, array))
+            if rest[:size]:
+                moves[array] = rest[:size]
+            rest = rest[size:]
+        return moves
+
+    def _fields(self, at: Evaluation) -> list[Vector]:
+        points = range(len(self.state.rule))
+        return [[at.value(slot, q) for slot in self.program.fields] for q in points]
+
+    def _residual(self, at: Evaluation, along: Along) -> Vector:
+        h = self.evaluator.arithmetic.step
+        out = []
+        for combination in map(self._numbers, along):
+            total = self.evaluator.arithmetic.number(0)
+            for slot, frozen in self.program.potentials:
+                plus, minus = (
+                    at.moved({"dofs": [t * h * v for v in combination]}, (slot,), frozen)
+                    for t in (1, -1)
+                )
+                total += (plus.value(slot) - minus.value(slot)) / (2 * h)
+            out.append(total)
+        return out
+
+    def _rate(self, moves: dict[str, Vector], along: Along) -> Vector:
+        h = self.evaluator.arithmetic.step
+        roots = tuple(slot for slot, _ in self.program.potentials)
+        plus, minus = (
+            self._residual(self.here.moved(_times(moves, t * h), roots), along) for t in (1, -1)
+        )
+        return [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
+
+
+def _times(moves: dict[str, Vector], factor: Number) -> dict[str, Vector]:
+    return {k: [factor * v for v in values] for k, values in moves.items()}
