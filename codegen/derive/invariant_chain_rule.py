@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from softehl.codegen.derive.linear_interfaces import Interface
+from softehl.codegen.derive.linear_interfaces import LinearInterface
 from softehl.codegen.derive.multilevel_chain_rule import Linearisation
 from softehl.codegen.derive.output_entries import Entry, Slot
 from softehl.codegen.derive.potential_structure import Structure
@@ -30,7 +30,9 @@ def by_slopes(d: Definition, s: Structure) -> Modal:
     return Modal(d, s, (upper,), _slopes(d.graph, s.interface, upper))
 
 
-def _slopes(g: Graph, interface: Interface, upper: Sequence[Node]) -> dict[Node, dict[Node, Node]]:
+def _slopes(
+    g: Graph, interface: LinearInterface, upper: Sequence[Node]
+) -> dict[Node, dict[Node, Node]]:
     """Named derivatives of the upper interface with respect to the point interface.
 
     The chain rule then never enters the forms in between: their congruence G^T H G becomes a sum

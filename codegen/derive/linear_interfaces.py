@@ -158,7 +158,7 @@ def _common_factors(n: Node, degree: Mapping[Node, int]) -> set[Node]:
 
 
 @dataclass(frozen=True)
-class Interface:
+class LinearInterface:
     """Result of the search.
 
     `rewritten` maps each linear form to its expanded self, in terms of the `point` interface (y_g,
@@ -171,7 +171,9 @@ class Interface:
     matrix: tuple[Vector, ...]
 
 
-def linear_interface(g: Graph, roots: Sequence[Node], sources: Sequence[Node]) -> Interface | None:
+def linear_interface(
+    g: Graph, roots: Sequence[Node], sources: Sequence[Node]
+) -> LinearInterface | None:
     """Expand every linear form below `roots`; None where nothing is gained."""
     degree = degrees(roots, sources)
     found = _Forms(g, degree)
@@ -182,8 +184,8 @@ def linear_interface(g: Graph, roots: Sequence[Node], sources: Sequence[Node]) -
     if sum(y.varying for y in found.point.values()) > sum(z.varying for z in linear):
         wide = _Forms(g, degree, by_mode=True)
         rewritten = {z: wide.rewrite(z) for z in linear}
-        return Interface(rewritten, (), tuple(wide.modes.values()), tuple(wide.modes))
-    return Interface(
+        return LinearInterface(rewritten, (), tuple(wide.modes.values()), tuple(wide.modes))
+    return LinearInterface(
         rewritten, tuple(found.point.values()), tuple(found.modes.values()), tuple(found.modes)
     )
 

@@ -20,7 +20,7 @@ from itertools import combinations, combinations_with_replacement
 from sympy import QQ
 from sympy.polys.matrices import DomainMatrix
 
-from softehl.codegen.derive.linear_interfaces import Interface, linear_interface
+from softehl.codegen.derive.linear_interfaces import LinearInterface, linear_interface
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.polynomial import Monomial, Polynomial, added, product, value
 from softehl.codegen.graph.traversal import (
@@ -350,7 +350,7 @@ class Structure:
 
     root: Node
     constant: tuple[Node, ...]
-    interface: Interface
+    interface: LinearInterface
     forms: tuple[Node, ...]
     squares: tuple[Node, ...] = ()
     invariants: bool = False

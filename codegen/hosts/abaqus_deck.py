@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from softehl.codegen.hosts import patch_mesh
 from softehl.codegen.hosts.abaqus_host import INCREMENTS, dt_of
-from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.patch_mesh import Patch
 from softehl.codegen.language.definition import Argument
 
@@ -14,7 +14,7 @@ SCALAR = 11
 """First degree of freedom of names that are no displacements: Abaqus calls it temperature."""
 
 
-def degrees(page: Interface) -> list[int]:
+def degrees(page: ElementInterface) -> list[int]:
     """Degree of freedom of each name: 1, 2, 3 of the displacements, 11, 12, ... of others."""
     others = [k for k in range(len(page.nodal)) if k not in page.vector]
     number = {k: 1 + n for n, k in enumerate(page.vector)}
@@ -22,7 +22,7 @@ def degrees(page: Interface) -> list[int]:
     return [number[k] for k in range(len(page.nodal))]
 
 
-def deck(page: Interface, mesh: Patch, settings: Sequence[float]) -> str:
+def deck(page: ElementInterface, mesh: Patch, settings: Sequence[float]) -> str:
     """The patch of the small host as an input deck."""
     numbers, dt = degrees(page), dt_of(page)
     lines = [
@@ -47,7 +47,7 @@ def deck(page: Interface, mesh: Patch, settings: Sequence[float]) -> str:
     return "\n".join(lines)
 
 
-def _element(page: Interface, settings: int) -> list[str]:
+def _element(page: ElementInterface, settings: int) -> list[str]:
     """The definition of the element, with the degrees of freedom at its nodes."""
     d, numbers = page.definition, degrees(page)
     rows = [
@@ -83,13 +83,13 @@ def named(
     return lines
 
 
-def _procedure(page: Interface) -> str:
+def _procedure(page: ElementInterface) -> str:
     if all(n < SCALAR for n in degrees(page)):
         return "*STATIC"
     return "*COUPLED TEMPERATURE-DISPLACEMENT" if page.vector else "*HEAT TRANSFER"
 
 
-def _initial(page: Interface) -> list[str]:
+def _initial(page: ElementInterface) -> list[str]:
     """Lines for a state that does not begin with zeros."""
     given = dict(page.definition.example)
     state = [given.get(a.name, 0.0) for a in page.state] * page.points

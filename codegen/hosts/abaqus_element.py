@@ -10,11 +10,11 @@ from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.abaqus_deck import deck, degrees
-from softehl.codegen.hosts.element_interface import Before, Given, Interface, Source, Timed
+from softehl.codegen.hosts.element_interface import Before, ElementInterface, Given, Source, Timed
 from softehl.codegen.hosts.test_states import samples
 
 
-def uel(page: Interface, states: Sequence[State]) -> dict[str, str]:
+def uel(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     """Every file of a user element."""
     _require(page)
     texts, kernel = c_interface.files(page, single=True)
@@ -34,7 +34,7 @@ def uel(page: Interface, states: Sequence[State]) -> dict[str, str]:
     return texts
 
 
-def _require(page: Interface) -> None:
+def _require(page: ElementInterface) -> None:
     page.require("abaqus", Task.TANGENT)
     if page.free:
         raise TargetError(
@@ -49,7 +49,7 @@ def _require(page: Interface) -> None:
         page.require("abaqus", Task.FIELDS)
 
 
-def _words(page: Interface) -> dict[str, object]:
+def _words(page: ElementInterface) -> dict[str, object]:
     d, numbers = page.definition, degrees(page)
     rows = [f"| {k + 1} | {a.name}: {a.meaning} |" for k, a in enumerate(page.given)]
     names = [f"`{f.name}` is {n}" for f, n in zip(page.nodal, numbers, strict=True)]
@@ -76,14 +76,14 @@ def _words(page: Interface) -> dict[str, object]:
     }
 
 
-def arguments(page: Interface) -> Iterable[str]:
+def arguments(page: ElementInterface) -> Iterable[str]:
     """Lines of C that fill parameters and data."""
     for array, sources in (("p", page.parameters), ("data", page.data)):
         for k, source in enumerate(sources):
             yield f"    {array}[{k}] = {_argument(page, source)};\n"
 
 
-def conditions(page: Interface, element: str) -> Iterable[str]:
+def conditions(page: ElementInterface, element: str) -> Iterable[str]:
     """Lines of C that refuse arguments which the page does not allow; element: its number in C."""
     d = page.definition
     rows = (("p", d.parameters), ("data", d.data))
@@ -95,7 +95,7 @@ def conditions(page: Interface, element: str) -> Iterable[str]:
         )
 
 
-def _argument(page: Interface, source: Source) -> str:
+def _argument(page: ElementInterface, source: Source) -> str:
     rate = "(*dtime > 0.0 ? 1.0 / *dtime : 0.0)"
     match source:
         case Given(index):
@@ -107,7 +107,7 @@ def _argument(page: Interface, source: Source) -> str:
             return f"-(U[{i}] - du[{i}]) * {rate}" if is_rate else f"U[{i}] - du[{i}]"
 
 
-def _outputs(page: Interface) -> Iterable[str]:
+def _outputs(page: ElementInterface) -> Iterable[str]:
     if Task.FIELDS in page.tasks:
         needed = "" if page.remembers else "if (*nsvars >= STATE + OUTPUT)\n        "
         yield f"    {needed}{page.name}_fields(1, X, u, data, p, fields);\n"
@@ -115,7 +115,7 @@ def _outputs(page: Interface) -> Iterable[str]:
         yield f"    {page.name}_energy(1, X, u, data, p, stored);\n"
 
 
-def _history(page: Interface) -> Iterable[str]:
+def _history(page: ElementInterface) -> Iterable[str]:
     """Lines of C that store the new state."""
     width, fields = len(page.state), len(page.definition.fields)
     for k, field in enumerate(page.renewed):

@@ -8,7 +8,7 @@ from dataclasses import replace
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
-from softehl.codegen.hosts.element_interface import Before, Given, Interface, Source, Timed
+from softehl.codegen.hosts.element_interface import Before, ElementInterface, Given, Source, Timed
 from softehl.codegen.hosts.patch_mesh import Patch
 from softehl.codegen.hosts.test_states import Sample
 
@@ -16,7 +16,7 @@ INCREMENTS = 4
 """Increments of the patch."""
 
 
-def program(page: Interface) -> str:
+def program(page: ElementInterface) -> str:
     """The host itself, in Fortran."""
     words = {
         "name": page.name,
@@ -31,17 +31,17 @@ def _fortran(value: float) -> str:
     return f"{value:g}".replace("e", "d")
 
 
-def dt_of(page: Interface) -> float:
+def dt_of(page: ElementInterface) -> float:
     """Length of an increment."""
     return dict(page.definition.example).get("dt", 1.0)
 
 
-def in_time(page: Interface, states: Sequence[State]) -> list[State]:
+def in_time(page: ElementInterface, states: Sequence[State]) -> list[State]:
     """States whose values of the step before are those of the state before in the list."""
     return [_stepped(page, s, states[k - 1].dofs) for k, s in enumerate(states)]
 
 
-def _stepped(page: Interface, state: State, before: Sequence[float]) -> State:
+def _stepped(page: ElementInterface, state: State, before: Sequence[float]) -> State:
     dt = dt_of(page)
 
     def value(source: Source, own: float) -> float:
@@ -59,7 +59,7 @@ def _stepped(page: Interface, state: State, before: Sequence[float]) -> State:
     )
 
 
-def settings_of(page: Interface, s: Sample) -> list[float]:
+def settings_of(page: ElementInterface, s: Sample) -> list[float]:
     """Values of the properties: those of a state."""
     values = [0.0] * len(page.given)
     pairs = [*zip(page.parameters, s.state.parameters, strict=True)]
@@ -70,7 +70,7 @@ def settings_of(page: Interface, s: Sample) -> list[float]:
     return values
 
 
-def _renewed(page: Interface, s: Sample, stored: int | None) -> list[float]:
+def _renewed(page: ElementInterface, s: Sample, stored: int | None) -> list[float]:
     """State of all points after a step, then the fields."""
     width = len(page.definition.fields)
     rows = [list(row) for row in s.state.point_data]
@@ -81,7 +81,7 @@ def _renewed(page: Interface, s: Sample, stored: int | None) -> list[float]:
     return [*(v for row in rows for v in row), *s.fields][:stored]
 
 
-def sample_file(page: Interface, found: Sequence[Sample], stored: int | None = None) -> str:
+def sample_file(page: ElementInterface, found: Sequence[Sample], stored: int | None = None) -> str:
     """samples.txt: what the host hands over, and what the element must give back.
 
     stored: numbers that the element stores; without it, state and fields.
@@ -109,7 +109,7 @@ def sample_file(page: Interface, found: Sequence[Sample], stored: int | None = N
     return "\n".join(lines) + "\n"
 
 
-def patch_file(page: Interface, mesh: Patch, settings: Sequence[float]) -> str:
+def patch_file(page: ElementInterface, mesh: Patch, settings: Sequence[float]) -> str:
     """patch.txt: the mesh, equations of each cell, and what is held."""
     number, fixed = patch_mesh.numbers(page, mesh), patch_mesh.held(page, mesh)
     width = page.variables

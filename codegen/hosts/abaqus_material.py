@@ -7,12 +7,13 @@ from dataclasses import replace
 
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts import material_common as shared
-from softehl.codegen.hosts.material_common import States
+from softehl.codegen.hosts.abaqus_element import uel
 from softehl.codegen.hosts.material_response import Measure, Response, checked, response
+from softehl.codegen.hosts.registry import Host, StatesOf
 from softehl.codegen.language.material import Law
 
 
-def umat(law: Law, states: States) -> dict[str, str]:
+def umat(law: Law, states: StatesOf) -> dict[str, str]:
     """Every file of a user material."""
     r = response(law, Measure.CAUCHY)
     r = checked(r, [replace(s, data=()) for s in states(r.written)])
@@ -30,6 +31,8 @@ def umat(law: Law, states: States) -> dict[str, str]:
     texts[f"{law.name}.inp"] = _deck(r, settings)
     return texts | more
 
+
+ABAQUS = Host(element=uel, material=umat)
 
 _VOLUME = (
     "(u[0] * (u[4] * u[8] - u[5] * u[7]) - u[1] * (u[3] * u[8] - u[5] * u[6])\n"

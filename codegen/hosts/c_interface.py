@@ -14,13 +14,13 @@ from softehl.codegen import abi, pipeline
 from softehl.codegen.abi import Task
 from softehl.codegen.emit import c_source
 from softehl.codegen.emit.c_printer import number
-from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.pipeline import KernelSource
 
 ARRAYS = "ptrdiff_t n, const double *X, const double *u, const double *data,\n    const double *p"
 
 
-def files(page: Interface, *, single: bool = False) -> tuple[dict[str, str], KernelSource]:
+def files(page: ElementInterface, *, single: bool = False) -> tuple[dict[str, str], KernelSource]:
     """Header, functions and kernels of a page, and the kernels' record.
 
     single: for a host that asks for one element at a time, so that lanes would be empty.
@@ -42,7 +42,7 @@ def _private(shared: str) -> str:
     return re.sub(r"^void softehl_pairs_", r"static \g<0>", shared, count=1, flags=re.MULTILINE)
 
 
-def sizes(page: Interface) -> dict[str, int]:
+def sizes(page: ElementInterface) -> dict[str, int]:
     """Constants of a page by the last part of their names."""
     d = page.definition
     return {
@@ -57,7 +57,7 @@ def sizes(page: Interface) -> dict[str, int]:
     }
 
 
-def header(page: Interface) -> str:
+def header(page: ElementInterface) -> str:
     """NAME.h, which C and C++ read."""
     name, guard = page.name, f"SOFTEHL_{page.name.upper()}_H"
     constants = [f"    {name.upper()}_{k} = {v}" for k, v in sizes(page).items()]
@@ -78,7 +78,7 @@ def header(page: Interface) -> str:
     )
 
 
-def described(page: Interface) -> str:
+def described(page: ElementInterface) -> str:
     """Comment with every argument of a page by its place."""
     d = page.definition
     rows = [f"{page.name}: {d.doc}", ""]
@@ -131,12 +131,12 @@ def _signature(task: str) -> Signature:
     return _SIGNATURES.get(task, slope)
 
 
-def prototype(page: Interface, task: str) -> str:
+def prototype(page: ElementInterface, task: str) -> str:
     """C prototype of a function of a page, without the semicolon."""
     return f"void {page.name}_{task}({ARRAYS}, {_signature(task).outputs})"
 
 
-def functions(page: Interface) -> str:
+def functions(page: ElementInterface) -> str:
     """End of NAME.c: each function hands the quadrature rule to its kernel."""
     rows = [f"    {', '.join(map(number, row))}," for row in page.rule]
     lines = [
@@ -148,7 +148,7 @@ def functions(page: Interface) -> str:
     return "\n".join(lines)
 
 
-def _call(page: Interface, task: str) -> str:
+def _call(page: ElementInterface, task: str) -> str:
     s, name = _signature(task), abi.function_name(page.name, task)
     return (
         f"    {name}(n, {page.points}, 0, X, u, data, p, {s.direction},\n"

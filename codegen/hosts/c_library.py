@@ -8,7 +8,9 @@ from typing import Any
 from softehl.codegen.abi import Task
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import c_interface
-from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.element_interface import ElementInterface
+from softehl.codegen.hosts.material_response import at_one_point
+from softehl.codegen.hosts.registry import Host
 from softehl.codegen.hosts.test_states import Sample, samples
 
 LIMIT = 1e-11
@@ -18,17 +20,21 @@ DIFFERENCE = 1e-5
 FLAGS = "-O2 -fno-math-errno -ffp-contract=fast -Wno-psabi"
 
 
-def c(page: Interface, states: Sequence[State]) -> dict[str, str]:
+def c(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     """Every file of target `c`."""
     return _files(page, states, "c")
 
 
-def cpp(page: Interface, states: Sequence[State]) -> dict[str, str]:
+def cpp(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     """Every file of target `cpp`: the same library, called from C++."""
     return _files(page, states, "cpp")
 
 
-def _files(page: Interface, states: Sequence[State], suffix: str) -> dict[str, str]:
+C = Host(element=c, material=at_one_point(c))
+CPP = Host(element=cpp, material=at_one_point(cpp))
+
+
+def _files(page: ElementInterface, states: Sequence[State], suffix: str) -> dict[str, str]:
     texts, kernel = c_interface.files(page)
     found = samples(page, kernel, states)
     words = {"name": page.name, "suffix": suffix, "flags": FLAGS, **_language(suffix)}
@@ -49,7 +55,7 @@ def _language(suffix: str) -> dict[str, str]:
     return {"compiler": "$(CXX) $(CXXFLAGS)", "languages": "C CXX"}
 
 
-def _functions(page: Interface) -> str:
+def _functions(page: ElementInterface) -> str:
     return ", ".join(f"`{page.name}_{t}`" for t in page.tasks)
 
 
@@ -74,7 +80,7 @@ def sample_table(found: Sequence[Sample]) -> str:
     return "\n".join([head, f"enum {{ SAMPLES = {len(found)} }};\n", *tables])
 
 
-def test(page: Interface) -> str:
+def test(page: ElementInterface) -> str:
     """The test program, which is C and C++."""
     checks, calls = [], []
     for task in page.tasks:
@@ -166,7 +172,7 @@ _DIFFERENCES: dict[str, str] = {
 }
 
 
-def example(page: Interface, first: Sample, suffix: str) -> str:
+def example(page: ElementInterface, first: Sample, suffix: str) -> str:
     """A small program that calls one function for one element and prints what it says."""
     task = next(t for t in _SIZES if t in page.tasks)
     count = _SIZES[task](page)
@@ -191,7 +197,7 @@ def example(page: Interface, first: Sample, suffix: str) -> str:
     )
 
 
-_SIZES: dict[str, Callable[[Interface], int]] = {
+_SIZES: dict[str, Callable[[ElementInterface], int]] = {
     Task.RESIDUAL: lambda page: len(page.definition.unknowns),
     Task.TANGENT: lambda page: len(page.definition.unknowns),
     Task.ENERGY: lambda page: 1,

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts import material_common as shared
-from softehl.codegen.hosts.material_common import States
 from softehl.codegen.hosts.material_response import Measure, Response, checked, packed, response
+from softehl.codegen.hosts.registry import Host, StatesOf
 from softehl.codegen.language.material import Law
 
 
-def library(law: Law, states: States) -> dict[str, str]:
+def library(law: Law, states: StatesOf) -> dict[str, str]:
     """Every file of a material of CalculiX.  Raises `TargetError`."""
     r = response(law, Measure.SECOND)
     found = [replace(s, data=()) for s in states(r.written)]
@@ -29,6 +29,9 @@ def library(law: Law, states: States) -> dict[str, str]:
     texts["NOTES.md"] = c_interface.filled(c_interface.template("calculix.md"), words)
     texts[f"{law.name}.inp"] = deck(r, settings)
     return texts | more
+
+
+CALCULIX = Host(material=library)
 
 
 def _names(law: Law) -> dict[str, str]:

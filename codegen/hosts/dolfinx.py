@@ -6,16 +6,16 @@ import json
 
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
-from softehl.codegen.hosts.element_interface import Interface
-from softehl.codegen.hosts.material_common import States
+from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.material_response import VOIGT, is_small, point
+from softehl.codegen.hosts.registry import Host, StatesOf
 from softehl.codegen.hosts.test_states import Sample, samples
 from softehl.codegen.language.material import Law
 
 
-def module(law: Law, states: States) -> dict[str, str]:
+def module(law: Law, states: StatesOf) -> dict[str, str]:
     """Every file of a material for forms of DOLFINx."""
-    page, small = Interface(point(law)), is_small(law)
+    page, small = ElementInterface(point(law)), is_small(law)
     texts, kernel = c_interface.files(page)
     found = samples(page, kernel, states(page.definition))
     words = _words(page, found[0], small)
@@ -35,7 +35,10 @@ def module(law: Law, states: States) -> dict[str, str]:
     return texts
 
 
-def _words(page: Interface, first: Sample, small: bool) -> dict[str, object]:
+DOLFINX = Host(material=module)
+
+
+def _words(page: ElementInterface, first: Sample, small: bool) -> dict[str, object]:
     d = page.definition
     pairs = zip(d.parameters, first.state.parameters, strict=True)
     return {
@@ -54,7 +57,7 @@ def _words(page: Interface, first: Sample, small: bool) -> dict[str, object]:
     }
 
 
-def _state(page: Interface, s: Sample, small: bool) -> dict[str, object]:
+def _state(page: ElementInterface, s: Sample, small: bool) -> dict[str, object]:
     """A displacement gradient, the state, and what the law must give there."""
     values, old = s.state.dofs, [float(v) for v in s.state.point_data[0]]
     new = [v if k is None else s.fields[k] for k, v in zip(page.renewed, old, strict=True)]

@@ -50,20 +50,20 @@ Source = Given | Timed | Before
 
 
 @dataclass(frozen=True)
-class Interface:
+class ElementInterface:
     """A page with a fixed number of unknowns; `of` makes it."""
 
     definition: Definition
 
     @staticmethod
-    def of(d: Definition, host: str) -> Interface:
+    def of(d: Definition, host: str) -> ElementInterface:
         """Raises `TargetError` for a page of interpolated fields, which no host can number."""
         if d.interpolated:
             raise TargetError(
                 f"{d.name} interpolates {d.interpolated} with any number of unknowns: target "
                 f"{host} needs a fixed number, use simd or scalar"
             )
-        return Interface(replace(d, pseudo_load=False, fields_rate=False))
+        return ElementInterface(replace(d, pseudo_load=False, fields_rate=False))
 
     def require(self, host: str, *tasks: str) -> None:
         """Raise `TargetError` where the page does not offer a task that a host needs."""

@@ -10,11 +10,13 @@ from softehl.codegen.abi import Task
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
-from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.element_interface import ElementInterface
+from softehl.codegen.hosts.material_response import at_one_point
+from softehl.codegen.hosts.registry import Host
 from softehl.codegen.hosts.test_states import Sample, samples
 
 
-def module(page: Interface, states: Sequence[State]) -> dict[str, str]:
+def module(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     """Every file of a module for JAX."""
     page.require("jax", Task.RESIDUAL, Task.TANGENT)
     page = with_derivatives(page)
@@ -39,24 +41,27 @@ def module(page: Interface, states: Sequence[State]) -> dict[str, str]:
     return texts
 
 
-def with_derivatives(page: Interface) -> Interface:
+JAX = Host(element=module, material=at_one_point(module))
+
+
+def with_derivatives(page: ElementInterface) -> ElementInterface:
     """The page with derivatives of its residual by every parameter and datum of the element."""
     d = page.definition
     arrays = (("parameters", d.parameters), ("data", d.data))
     by = [(a.name, d.graph.input(array, k)) for array, row in arrays for k, a in enumerate(row)]
-    return Interface(replace(d, derivatives=tuple(by)))
+    return ElementInterface(replace(d, derivatives=tuple(by)))
 
 
-def _parts(page: Interface) -> list[str]:
+def _parts(page: ElementInterface) -> list[str]:
     own = [t for t in (Task.ENERGY, Task.FIELDS) if t in page.tasks]
     return [*own, Task.RESIDUAL]
 
 
-def _tasks(page: Interface) -> list[str]:
+def _tasks(page: ElementInterface) -> list[str]:
     return [t for t in page.tasks if t != Task.PRODUCT]
 
 
-def _operations(page: Interface) -> list[str]:
+def _operations(page: ElementInterface) -> list[str]:
     """C++ of each operation."""
     d = page.definition
     width = {Task.ENERGY: 1, Task.FIELDS: page.points * len(d.fields)}
@@ -78,7 +83,7 @@ def _operations(page: Interface) -> list[str]:
     return texts
 
 
-def _words(page: Interface, first: Sample) -> dict[str, object]:
+def _words(page: ElementInterface, first: Sample) -> dict[str, object]:
     d, sizes = page.definition, c_interface.sizes(page)
     has_energy = Task.ENERGY in page.tasks
     pairs = zip(d.parameters, first.state.parameters, strict=True)
@@ -122,7 +127,7 @@ def _sample_file(found: Sequence[Sample]) -> str:
     return json.dumps(values) + "\n"
 
 
-def _patch_file(page: Interface) -> str:
+def _patch_file(page: ElementInterface) -> str:
     """A patch of cells: places, numbers of unknowns, and what is held."""
     assert page.cell is not None
     mesh = patch_mesh.patch(page.cell)

@@ -6,24 +6,21 @@ modulus as the program does; it must give the forces and the stiffness of the la
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from softehl.codegen.abi import Task
 from softehl.codegen.elements import cells
-from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.abaqus_deck import named
 from softehl.codegen.hosts.abaqus_element import arguments, conditions
-from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.material_response import Measure, Response, solid
+from softehl.codegen.hosts.registry import StatesOf
 from softehl.codegen.hosts.test_states import samples
-from softehl.codegen.language.definition import Definition
 from softehl.codegen.pipeline import compile_model
 
-States = Callable[[Definition], Sequence[State]]
-"""States at which a page has values."""
 PULL, TWIST = 0.2, 0.3
 """Stretch of the block in a deck, and its twist by shear."""
 
@@ -62,7 +59,7 @@ def _outputs(r: Response) -> list[str]:
     return [name for name, _ in d.fields[r.own : len(d.fields) - len(d.history)]]
 
 
-def _history(page: Interface) -> Iterable[str]:
+def _history(page: ElementInterface) -> Iterable[str]:
     """Lines of C that store the new state."""
     for k, field in enumerate(page.renewed):
         value = f"data[{k}]" if field is None else f"fields[{field}]"
@@ -74,10 +71,10 @@ def depvar(r: Response) -> list[str]:
     return ["*DEPVAR", str(n)] if (n := words(r, "")["depvar"]) else []
 
 
-def tests(r: Response, states: States) -> tuple[dict[str, str], list[float]]:
+def tests(r: Response, states: StatesOf) -> tuple[dict[str, str], list[float]]:
     """Files of the small host, and values of the constants."""
     d = solid(r.law)
-    page = Interface(replace(d, tasks=(Task.TANGENT, Task.FIELDS)[: 1 + bool(d.fields)]))
+    page = ElementInterface(replace(d, tasks=(Task.TANGENT, Task.FIELDS)[: 1 + bool(d.fields)]))
     kernel = compile_model(page.definition)
     found = samples(page, kernel, host.in_time(page, states(page.definition)))
     settings = host.settings_of(page, found[0])
@@ -91,11 +88,11 @@ def tests(r: Response, states: States) -> tuple[dict[str, str], list[float]]:
     }, settings
 
 
-def _from_zero(page: Interface) -> Interface:
+def _from_zero(page: ElementInterface) -> ElementInterface:
     """The page with a state that begins as zero, whatever its example is."""
     state = {a.name for a in page.state}
     example = tuple(pair for pair in page.definition.example if pair[0] not in state)
-    return Interface(replace(page.definition, example=example))
+    return ElementInterface(replace(page.definition, example=example))
 
 
 def block(count: int = 2) -> tuple[list[str], list[str], list[str]]:

@@ -7,7 +7,7 @@ differentiated along them: so the modulus is exact, and no formula converts it a
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -20,7 +20,8 @@ from softehl.codegen.elements import cells, quadrature
 from softehl.codegen.graph.evaluation import State, Walk
 from softehl.codegen.graph.graph import Node
 from softehl.codegen.graph.traversal import substitute
-from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.element_interface import ElementInterface
+from softehl.codegen.hosts.registry import Files, StatesOf
 from softehl.codegen.language import kinematics
 from softehl.codegen.language.definition import Argument, Definition
 from softehl.codegen.language.material import Law, Material
@@ -55,9 +56,9 @@ class Response:
     symmetric: bool
 
     @property
-    def page(self) -> Interface:
+    def page(self) -> ElementInterface:
         """The response as a page without nodes."""
-        return Interface(self.definition)
+        return ElementInterface(self.definition)
 
     @property
     def parameters(self) -> list[Argument]:
@@ -262,3 +263,15 @@ def solid(law: Law, name: str = "tet4") -> Definition:
     else:
         m.weak_form([(found.P[k] * e.detJ, F[k]) for k in range(9)])
     return m.finish()
+
+
+def at_one_point(
+    write: Callable[[ElementInterface, Sequence[State]], Files],
+) -> Callable[[Law, StatesOf], Files]:
+    """Writer for materials from one for elements: a page of one point, with stress and modulus."""
+
+    def files(law: Law, states: StatesOf) -> Files:
+        page = ElementInterface(point(law))
+        return write(page, states(page.definition))
+
+    return files

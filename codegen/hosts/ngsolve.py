@@ -13,7 +13,8 @@ from softehl.codegen.elements.cells import Element
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, patch_mesh
-from softehl.codegen.hosts.element_interface import Given, Interface
+from softehl.codegen.hosts.element_interface import ElementInterface, Given
+from softehl.codegen.hosts.registry import Host
 from softehl.codegen.hosts.test_states import Sample, samples
 
 KINDS = {
@@ -35,7 +36,7 @@ MESHES = {
 }
 
 
-def module(page: Interface, states: Sequence[State]) -> dict[str, str]:
+def module(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     """Every file of the integrator."""
     kind = _kind(page)
     texts, kernel = c_interface.files(page, single=True)
@@ -51,14 +52,17 @@ def module(page: Interface, states: Sequence[State]) -> dict[str, str]:
     return texts
 
 
-def _many(page: Interface) -> dict[str, str]:
+NGSOLVE = Host(element=module)
+
+
+def _many(page: ElementInterface) -> dict[str, str]:
     """The tangent again, for many cells at a time, under another name."""
     d = page.definition
-    again = Interface(replace(d, name=f"{d.name}_many", tasks=(Task.TANGENT,)))
+    again = ElementInterface(replace(d, name=f"{d.name}_many", tasks=(Task.TANGENT,)))
     return c_interface.files(again)[0]
 
 
-def _kind(page: Interface) -> Element:
+def _kind(page: ElementInterface) -> Element:
     """The cell of the page.  Raises `TargetError`."""
     page.require("ngsolve", Task.TANGENT)
     kind = page.cell
@@ -108,7 +112,7 @@ def _mirrored(row: Sequence[float]) -> list[float]:
     return [1 - row[0]] if len(row) == 1 else [row[1], row[0], *row[2:]]
 
 
-def _space(page: Interface, order: int) -> str:
+def _space(page: ElementInterface, order: int) -> str:
     """The space as a line of Python."""
     full = page.definition.nodes
     parts = []
@@ -122,7 +126,7 @@ def _space(page: Interface, order: int) -> str:
     return " * ".join(parts)
 
 
-def _words(page: Interface, kind: Element, first: Sample) -> dict[str, object]:
+def _words(page: ElementInterface, kind: Element, first: Sample) -> dict[str, object]:
     d, (name, order) = page.definition, KINDS[kind.name]
     parent = _parent(kind)
     pairs = zip(page.given, host.settings_of(page, first), strict=True)
@@ -159,7 +163,7 @@ def _words(page: Interface, kind: Element, first: Sample) -> dict[str, object]:
     }
 
 
-def _of_test(page: Interface, kind: Element, first: Sample) -> dict[str, Any]:
+def _of_test(page: ElementInterface, kind: Element, first: Sample) -> dict[str, Any]:
     d, corner = page.definition, _corners(kind)
     weights = [[float(N) for N in corner.shape(*place)] for place in kind.nodes]
     image = [tuple(_mirrored([float(c) for c in p])) for p in corner.nodes]

@@ -11,7 +11,7 @@ from fractions import Fraction
 from itertools import permutations, product
 
 from softehl.codegen.elements.cells import Element
-from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.element_interface import ElementInterface
 
 Place = tuple[Fraction, ...]
 Map = Callable[[Place], Place]
@@ -87,21 +87,21 @@ def _distorted(place: Place) -> list[float]:
 
 @dataclass(frozen=True)
 class Held:
-    """Node, number of the name in `Interface.nodal`, and value at the end."""
+    """Node, number of the name in `ElementInterface.nodal`, and value at the end."""
 
     node: int
     field: int
     value: float
 
 
-def starts(page: Interface) -> list[float]:
+def starts(page: ElementInterface) -> list[float]:
     """Value at rest of each name: that of the page's example at node 1, else zero."""
     given = dict(page.definition.example)
     names = page.definition.unknowns
     return [given.get(names[f.places[0]], 0.0) for f in page.nodal]
 
 
-def held(page: Interface, mesh: Patch) -> list[Held]:
+def held(page: ElementInterface, mesh: Patch) -> list[Held]:
     """Values held on both ends: of every name that stands at all nodes."""
     full = [k for k, f in enumerate(page.nodal) if len(f.places) == page.definition.nodes]
     rest = starts(page)
@@ -116,7 +116,7 @@ def held(page: Interface, mesh: Patch) -> list[Held]:
     ]
 
 
-def numbers(page: Interface, mesh: Patch) -> dict[tuple[int, int], int]:
+def numbers(page: ElementInterface, mesh: Patch) -> dict[tuple[int, int], int]:
     """Equation of each (node, number of the name), node after node."""
     there: dict[tuple[int, int], None] = {}
     for cell in mesh.cells:

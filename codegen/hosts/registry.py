@@ -1,57 +1,66 @@
-"""Every host by the name of its target."""
+"""Registry of hosts: programs that take a page, by the name of their target.
+
+A package registers a host as an entry point of the group `softehl.hosts`, whose object is a `Host`:
+
+    [project.entry-points."softehl.hosts"]
+    my_program = "my_package.my_module:HOST"
+
+The hosts of softehl itself also work from a checkout without metadata.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from typing import TYPE_CHECKING, TypeAlias
 
-from softehl.codegen.graph.evaluation import State
-from softehl.codegen.hosts import (
-    abaqus_element,
-    abaqus_material,
-    c_library,
-    calculix,
-    dolfinx,
-    jax,
-    ngsolve,
-)
-from softehl.codegen.hosts.element_interface import Interface
-from softehl.codegen.hosts.material_common import States
-from softehl.codegen.hosts.material_response import point
-from softehl.codegen.language.material import Law
+from softehl.codegen.abi import TargetError
 
-Files = dict[str, str]
+if TYPE_CHECKING:
+    from softehl.codegen.graph.evaluation import State
+    from softehl.codegen.hosts.element_interface import ElementInterface
+    from softehl.codegen.language.definition import Definition
+    from softehl.codegen.language.material import Law
+
+GROUP = "softehl.hosts"
+BUILT_IN = {
+    "c": "softehl.codegen.hosts.c_library:C",
+    "cpp": "softehl.codegen.hosts.c_library:CPP",
+    "abaqus": "softehl.codegen.hosts.abaqus_material:ABAQUS",
+    "calculix": "softehl.codegen.hosts.calculix:CALCULIX",
+    "jax": "softehl.codegen.hosts.jax:JAX",
+    "ngsolve": "softehl.codegen.hosts.ngsolve:NGSOLVE",
+    "ufcx": "softehl.codegen.hosts.dolfinx:DOLFINX",
+}
+"""Hosts of softehl, as in pyproject.toml."""
+
+Files: TypeAlias = dict[str, str]
 """Text of each file of a folder, by its name."""
-
-Element = Callable[[Interface, Sequence[State]], Files]
-"""Writer of the files of a page, with states for their tests."""
-ELEMENTS: dict[str, Element] = {
-    "c": c_library.c,
-    "cpp": c_library.cpp,
-    "abaqus": abaqus_element.uel,
-    "jax": jax.module,
-    "ngsolve": ngsolve.module,
-}
-"""Writers of the hosts that take a page of an element, with two states for their tests."""
+StatesOf: TypeAlias = "Callable[[Definition], Sequence[State]]"
+"""States at which a page has values, for the tests of a folder."""
 
 
-def _at_a_point(write: Element) -> Callable[[Law, States], Files]:
-    """A writer of elements for materials: a page of one point, with stress and modulus."""
+@dataclass(frozen=True)
+class Host:
+    """Writers of the files for an element and for a material; None where the host takes none.
 
-    def files(law: Law, states: States) -> Files:
-        page = Interface(point(law))
-        return write(page, states(page.definition))
+    They raise `TargetError` for pages that the program cannot hold.
+    """
 
-    return files
+    element: Callable[[ElementInterface, Sequence[State]], Files] | None = None
+    material: Callable[[Law, StatesOf], Files] | None = None
 
 
-MATERIALS: dict[str, Callable[[Law, States], Files]] = {
-    "abaqus": abaqus_material.umat,
-    "calculix": calculix.library,
-    "c": _at_a_point(c_library.c),
-    "cpp": _at_a_point(c_library.cpp),
-    "jax": _at_a_point(jax.module),
-    "ufcx": dolfinx.module,
-}
-"""Writers of the hosts that take a material, with a function that gives states for their tests."""
-HOSTS = tuple(dict.fromkeys([*ELEMENTS, *MATERIALS]))
-"""Names of all targets that are hosts."""
+def targets() -> dict[str, EntryPoint]:
+    """Entry points of all hosts by the name of their target."""
+    registered = {e.name: e for e in entry_points(group=GROUP)}
+    return registered | {name: EntryPoint(name, at, GROUP) for name, at in BUILT_IN.items()}
+
+
+def host(target: str) -> Host:
+    """Host of a target.  Raises `TargetError` where its entry point is no `Host`."""
+    loaded = targets()[target].load()
+    if not isinstance(loaded, Host):
+        raise TargetError(f"target {target}: its entry point is no softehl Host, but {loaded!r}")
+    return loaded

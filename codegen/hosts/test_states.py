@@ -16,7 +16,7 @@ from softehl.codegen.abi import Task
 from softehl.codegen.derive.output_entries import Entry
 from softehl.codegen.derive.task_outputs import outputs
 from softehl.codegen.graph.evaluation import State, Walk
-from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.pipeline import KernelSource
 
 DIGITS = 30
@@ -41,7 +41,7 @@ class Sample:
         return [float(v) for row in (self.state.data, *self.state.point_data) for v in row]
 
 
-def sample(page: Interface, kernel: KernelSource, state: State) -> Sample:
+def sample(page: ElementInterface, kernel: KernelSource, state: State) -> Sample:
     """The values of all tasks at one state."""
     # where the loop over the points is written out, their data stand behind those of the element
     flat = [v for row in (state.data, *state.point_data) for v in row]
@@ -68,7 +68,7 @@ def sample(page: Interface, kernel: KernelSource, state: State) -> Sample:
     )
 
 
-def _entries(page: Interface, kernel: KernelSource, task: str) -> list[Entry]:
+def _entries(page: ElementInterface, kernel: KernelSource, task: str) -> list[Entry]:
     """Outputs of the whole element, also of a kernel that is made of functions of a point."""
     if task not in kernel.functions:
         return []
@@ -77,6 +77,6 @@ def _entries(page: Interface, kernel: KernelSource, task: str) -> list[Entry]:
     return outputs(page.definition, task) if at_point else function.chosen.entries
 
 
-def samples(page: Interface, kernel: KernelSource, states: Sequence[State]) -> list[Sample]:
+def samples(page: ElementInterface, kernel: KernelSource, states: Sequence[State]) -> list[Sample]:
     """The values at several states."""
     return [sample(page, kernel, s) for s in states]

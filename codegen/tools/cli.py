@@ -8,7 +8,7 @@ from pathlib import Path
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import BuildError, Target
-from softehl.codegen.hosts.registry import HOSTS
+from softehl.codegen.hosts import registry
 from softehl.codegen.language.material import Law
 from softehl.codegen.language.weak_form import On
 from softehl.codegen.models import ALL
@@ -60,7 +60,7 @@ def generate(
     """
     try:
         _require_printable(*models, *([out] if out else []))
-        if target in HOSTS and (target != Target.UFCX or _materials(models, On(*on))):
+        if target in registry.targets() and (target != Target.UFCX or _materials(models, On(*on))):
             if check or trace is not None:
                 return _refused(f"--check and --trace know target simd, not {target}")
             return host_files.generate(models, target, out, On(*on))

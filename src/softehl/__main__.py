@@ -99,6 +99,7 @@ def _commands() -> "click.Group":
 
     from softehl.cases.app.command import app
     from softehl.cases.cli import design, keys, report_runs, reproduce, run, sweep
+    from softehl.codegen.hosts.registry import targets
 
     @click.group(no_args_is_help=False)
     @click.version_option(__version__, prog_name="softehl")
@@ -111,9 +112,7 @@ def _commands() -> "click.Group":
     @click.option("--trace", metavar="KERNEL", help="Show KERNEL before and after each pass.")
     @click.option(
         "--target",
-        type=click.Choice(
-            ["simd", "scalar", "ufcx", "c", "cpp", "abaqus", "calculix", "jax", "ngsolve"]
-        ),
+        type=click.Choice(list(dict.fromkeys(["simd", "scalar", "ufcx", *targets()]))),
         default="simd",
         show_default=True,
         help="C for several elements at once (simd) or one (scalar), or code for another program.",

@@ -14,7 +14,7 @@ import sympy as sp
 
 from softehl.codegen import pipeline
 from softehl.codegen.derive import potential_structure
-from softehl.codegen.derive.linear_interfaces import Interface, linear_interface
+from softehl.codegen.derive.linear_interfaces import LinearInterface, linear_interface
 from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.graph.traversal import strip
@@ -28,7 +28,7 @@ QUAD = ((1, 1, 1, 1), (-1, 1, 1, -1), (-1, -1, 1, 1), (1, -1, 1, -1))
 """Constant, xi, eta and hourglass mode of a quadrilateral, counterclockwise."""
 
 
-def interface_of(d: Definition) -> Interface:
+def interface_of(d: Definition) -> LinearInterface:
     (root,), _ = strip(d.graph, [d.potential], d.constant)
     found = linear_interface(d.graph, [root], d.directions)
     assert found is not None
@@ -129,7 +129,7 @@ def test_values_are_those_of_direct_differentiation(monkeypatch: pytest.MonkeyPa
 def test_a_wrong_interface_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A matrix that is off by 1e-9 in one coefficient."""
 
-    def off(g: Any, roots: Any, sources: Any) -> Interface | None:
+    def off(g: Any, roots: Any, sources: Any) -> LinearInterface | None:
         found = linear_interface(g, roots, sources)
         assert found is not None
         (source, c), *rest = found.matrix[0]

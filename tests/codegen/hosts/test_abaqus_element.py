@@ -15,7 +15,7 @@ import softehl
 from softehl.codegen.abi import TargetError
 from softehl.codegen.elements import quadrature
 from softehl.codegen.hosts import patch_mesh
-from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
@@ -52,7 +52,7 @@ def patched(place: Path, pull: float, increments: int = 4, **properties: float) 
 
 def study(d: Definition, pull: float, **settings: Any) -> softehl.Study:
     """The same patch."""
-    kind = Interface.of(d, "abaqus").cell
+    kind = ElementInterface.of(d, "abaqus").cell
     assert kind is not None
     mesh = patch_mesh.patch(kind)
     cells = {kind.name: np.array(mesh.cells)}
@@ -65,7 +65,7 @@ def study(d: Definition, pull: float, **settings: Any) -> softehl.Study:
 
 def off(d: Definition, result: softehl.Result, place: Path) -> float:
     """Largest difference between the solutions, by the largest value."""
-    seen = Interface.of(d, "abaqus")
+    seen = ElementInterface.of(d, "abaqus")
     assert seen.cell is not None
     number = patch_mesh.numbers(seen, patch_mesh.patch(seen.cell))
     found = np.loadtxt(place / "solution.txt")[: len(number)]

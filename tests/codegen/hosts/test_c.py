@@ -11,8 +11,8 @@ from hypothesis import given
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import TargetError
-from softehl.codegen.hosts.element_interface import Before, Given, Interface, Timed
-from softehl.codegen.hosts.registry import ELEMENTS
+from softehl.codegen.hosts import registry
+from softehl.codegen.hosts.element_interface import Before, ElementInterface, Given, Timed
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import cli, host_files
@@ -101,7 +101,7 @@ def test_random_pages_in_cpp(d: Definition, tmp_path_factory: pytest.TempPathFac
 
 
 def test_who_fills_the_arguments_of_a_page() -> None:
-    seen = Interface.of(simple(), "c")
+    seen = ElementInterface.of(simple(), "c")
     assert seen.parameters == [Given(0)]
     assert seen.data == [Given(1), *(Before(k, rate=False) for k in range(4))]
     assert [a.name for a in seen.given] == ["k", "c"]
@@ -116,12 +116,12 @@ def test_rates_come_from_the_step_in_time() -> None:
     from softehl.codegen.tools import model_loader
 
     (heat,) = model_loader.definitions(HEAT)
-    seen = Interface.of(heat, "c")
+    seen = ElementInterface.of(heat, "c")
     assert seen.parameters == [Given(0), Given(1), Timed("rate")]
     assert seen.data == [Before(0, rate=True), Before(1, rate=True)]
 
 
-@pytest.mark.parametrize("host", ELEMENTS)
+@pytest.mark.parametrize("host", [t for t in registry.BUILT_IN if registry.host(t).element])
 def test_an_interpolated_field_is_refused(host: str) -> None:
     said = rf"film interpolates p .* target {host} needs a fixed number"
     with pytest.raises(TargetError, match=said):

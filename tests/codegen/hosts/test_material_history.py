@@ -12,7 +12,7 @@ import pytest
 import softehl
 from softehl.codegen.abi import TargetError
 from softehl.codegen.hosts import patch_mesh
-from softehl.codegen.hosts.element_interface import Interface
+from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.material_response import solid
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.tools import host_files, model_loader
@@ -43,7 +43,7 @@ def settled(law: Law, place: Path) -> None:
 def by_study(law: Law) -> Array:
     """The same patch in increments of one second, node by node."""
     d = solid(law)
-    kind = Interface.of(d, "abaqus").cell
+    kind = ElementInterface.of(d, "abaqus").cell
     assert kind is not None
     mesh = patch_mesh.patch(kind)
     study = softehl.Study(softehl.Mesh(np.array(mesh.points), {kind.name: np.array(mesh.cells)}))
