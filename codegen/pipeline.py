@@ -42,7 +42,7 @@ from softehl.codegen.emit.basic_blocks import arranged_plan
 from softehl.codegen.emit.code_motion import Schedule, is_straight, schedule, straight_line
 from softehl.codegen.emit.instruction_scheduling import arranged
 from softehl.codegen.emit.points import cell_constants, point_kernel, sum_factored_product
-from softehl.codegen.emit.points.point_function import Outputs
+from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_kernel import Choice, choose
 from softehl.codegen.emit.points.point_layout import Layout, Needs
 from softehl.codegen.graph.graph import Routine
@@ -161,7 +161,7 @@ def form(d: Definition) -> Choice:
     if strange:
         return Choice(False, f"a derivative by {strange[0]}, which a point does not know")
     attempt = _moduli(site, Task.TANGENT)
-    outputs = Outputs(attempt.entries)
+    outputs = PointOutputs(attempt.entries)
     return choose(Layout(d, d.point), outputs, attempt.operations, SHORT)
 
 
@@ -202,7 +202,7 @@ def _at_point(layout: Layout, task: str) -> Function:
     )
 
 
-def _at_centroid(layout: Layout, task: str, point: Outputs) -> point_kernel.At | None:
+def _at_centroid(layout: Layout, task: str, point: PointOutputs) -> point_kernel.At | None:
     """Values at the centroid that the function of a point reads, None where there are none."""
     form, needs = layout.form, Needs.of(point.entries)
     first = point_outputs.first_rate(form.definition, task)
@@ -212,12 +212,12 @@ def _at_centroid(layout: Layout, task: str, point: Outputs) -> point_kernel.At |
     way = Variant("at the centroid", point_outputs.at_centroid(form, task))
     attempt = _attempt(layout.site, way, unrolled=True)
     outputs, plan, _ = _ordered(layout, task, attempt)
-    return point_kernel.At(Outputs(outputs.entries, square=False), plan)
+    return point_kernel.At(PointOutputs(outputs.entries, square=False), plan)
 
 
 def _ordered(
     layout: Layout, task: str, chosen: Attempt | None = None
-) -> tuple[Outputs, Schedule, tuple[Routine, ...]]:
+) -> tuple[PointOutputs, Schedule, tuple[Routine, ...]]:
     """Outputs of a task at a point, statements in the printed order, and routines they call."""
     site = layout.site
     chosen = chosen or _moduli(site, task)
@@ -228,7 +228,7 @@ def _ordered(
         entries, plan = placed(entries, roots), straight_line(order)
     else:
         plan = arranged_plan(site.graph, plan, [x.node for x in entries])
-    return Outputs(entries), plan, called
+    return PointOutputs(entries), plan, called
 
 
 def _file(d: Definition, functions: Sequence[Function], *, single: bool) -> str:

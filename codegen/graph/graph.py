@@ -88,7 +88,7 @@ class Input:
 
 
 @dataclass(frozen=True)
-class Place:
+class ResultIndex:
     """Position of an `ITEM` among the results of its routine."""
 
     index: int
@@ -114,7 +114,7 @@ class Routine:
         raise NotImplementedError
 
 
-Payload = Fraction | Input | str | Place | Routine | None
+Payload = Fraction | Input | str | ResultIndex | Routine | None
 
 
 class Node:
@@ -337,7 +337,7 @@ class Graph:
     def run(self, routine: Routine, args: Sequence[Node]) -> list[Node]:
         """The results of a routine."""
         call = self.node(Op.CALL, tuple(args), routine)
-        return [self.node(Op.ITEM, (call,), Place(k)) for k in range(routine.outputs)]
+        return [self.node(Op.ITEM, (call,), ResultIndex(k)) for k in range(routine.outputs)]
 
     def rebuild(self, op: Op, args: Sequence[Node], payload: Payload) -> Node:
         """The constructor of `op`, with its identities, on new operands.

@@ -22,14 +22,14 @@ Pairs = list[tuple[Node, Node]]
 
 
 @dataclass(frozen=True)
-class Local:
+class LocalisedValues:
     """Values written in `local` and `external` inputs; `external` are the nodes behind these."""
 
     values: tuple[Node, ...]
     external: tuple[Node, ...]
 
 
-def localise(g: Graph, values: Sequence[Node], unknowns: Sequence[Node]) -> Local:
+def localise(g: Graph, values: Sequence[Node], unknowns: Sequence[Node]) -> LocalisedValues:
     """Cut `values` off from the graph around them: what `unknowns` do not enter comes from outside.
 
     Values that can be computed once are computed outside, but not across a branch, whose other
@@ -53,7 +53,7 @@ def localise(g: Graph, values: Sequence[Node], unknowns: Sequence[Node]) -> Loca
     found = sorted(external, key=lambda n: n.id)
     replacement = {u: g.input("local", k) for k, u in enumerate(unknowns)}
     replacement |= {n: g.input("external", k) for k, n in enumerate(found)}
-    return Local(tuple(substitute(g, values, replacement)[0]), tuple(found))
+    return LocalisedValues(tuple(substitute(g, values, replacement)[0]), tuple(found))
 
 
 def depends(values: Sequence[Node], sources: Iterable[Node]) -> set[Node]:
@@ -173,7 +173,7 @@ def _contracted(g: Graph, a: Sequence[Node], b: Sequence[Node]) -> Node:
     return total
 
 
-def newton(g: Graph, name: str, local: Local, control: Control) -> Newton:
+def newton(g: Graph, name: str, local: LocalisedValues, control: Control) -> Newton:
     """The routine that solves `local.values` = 0 for as many local unknowns."""
     count = len(local.values)
     s = [g.input("local", k) for k in range(count)]

@@ -17,7 +17,7 @@ from softehl.codegen.language.definition import Argument, Definition
 
 
 @dataclass(frozen=True)
-class Nodal:
+class NodalUnknown:
     """Unknowns of one name: `places` are their numbers at the nodes 0, 1, ... of the element."""
 
     name: str
@@ -115,13 +115,13 @@ class ElementInterface:
     # unknowns -----------------------------------------------------------------------------------
 
     @cached_property
-    def nodal(self) -> tuple[Nodal, ...]:
+    def nodal(self) -> tuple[NodalUnknown, ...]:
         """Unknowns that stand at nodes, by name, in the order of the page."""
         found: dict[str, list[int]] = {}
         for place, (name, node) in enumerate(self.definition.places):
             if node is not None:
                 found.setdefault(name, []).append(place)
-        return tuple(Nodal(name, tuple(places)) for name, places in found.items())
+        return tuple(NodalUnknown(name, tuple(places)) for name, places in found.items())
 
     @cached_property
     def free(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from softehl.codegen.language.definition import Component
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.fields import AXISYMMETRIC
 from softehl.codegen.language.flatten import Entries
-from softehl.codegen.language.nodal_fields import Nodal
+from softehl.codegen.language.nodal_fields import NodalFields
 
 
 class NeedsTraces(ModelError):  # noqa: N818 (named after what it is)
@@ -27,7 +27,7 @@ class NeedsTraces(ModelError):  # noqa: N818 (named after what it is)
         super().__init__(f"{what}: {words}")
 
 
-class Side(Nodal):
+class BoundaryModel(NodalFields):
     """Faces of a mesh, of one dimension less; slopes are those along the parent coordinates."""
 
     def __init__(

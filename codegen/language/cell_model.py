@@ -15,10 +15,10 @@ from softehl.codegen.language.definition import Component
 from softehl.codegen.language.fields import AXISYMMETRIC
 from softehl.codegen.language.flatten import Entries, Matrix
 from softehl.codegen.language.model import PARENT_NAMES
-from softehl.codegen.language.nodal_fields import Nodal
+from softehl.codegen.language.nodal_fields import NodalFields
 
 
-class Whole(Nodal):
+class CellModel(NodalFields):
     """Values and gradients are sums over nodes, densities are integrated over the cell."""
 
     _parent_names = PARENT_NAMES

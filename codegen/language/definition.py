@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.graph.graph import Graph, Node
-from softehl.codegen.language.sympy_tape import Record
+from softehl.codegen.language.sympy_tape import SympyTape
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Definition:
     """The cell of a page of fields, which could stand on another one, too."""
     point: PointForm | None = field(default=None, compare=False)
     """The same page at a point, from which the kernel of the whole element can be made as well."""
-    record: Record = field(default_factory=Record, repr=False, compare=False)
+    record: SympyTape = field(default_factory=SympyTape, repr=False, compare=False)
     """The page as written, by which kernels are checked; nothing is derived from it."""
 
     def __repr__(self) -> str:

@@ -19,7 +19,7 @@ from softehl.codegen.language.definition import Component, Definition
 from softehl.codegen.language.errors import Elsewhere, ModelError
 from softehl.codegen.language.fields import AXISYMMETRIC, Traced
 from softehl.codegen.language.flatten import Entries
-from softehl.codegen.language.nodal_fields import Nodal
+from softehl.codegen.language.nodal_fields import NodalFields
 
 FIRST = {"tri": (0, 1), "quad": (0, 1), "tet": (0, 2, 1), "hex": (0, 3, 2, 1)}
 """Corners of the first face of a cell, seen from outside counterclockwise."""
@@ -39,7 +39,7 @@ def shape_of(cell: Element) -> str:
     return shape
 
 
-class Facet(Nodal):
+class FacetModel(NodalFields):
     """Values and gradients of the cells at a facet; `both` for one between two cells."""
 
     def __init__(

@@ -18,7 +18,7 @@ from softehl.codegen.language import local_unknowns
 from softehl.codegen.language.definition import Argument, Definition
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.flatten import Listed
-from softehl.codegen.language.model_builder import Draft
+from softehl.codegen.language.model_builder import ModelBuilder
 
 __all__ = ["Argument", "Definition", "Model"]
 
@@ -27,7 +27,7 @@ PARENT_NAMES = ("parent_xi", "parent_eta", "parent_zeta")
 """Names of parent coordinates where a page or a law may use the short ones itself."""
 
 
-class Model(Draft):
+class Model(ModelBuilder):
     """Builder of a `Definition`; methods declare arguments, name values and add equations.
 
     Parameters

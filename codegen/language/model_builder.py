@@ -464,7 +464,7 @@ LONGEST = 200
 """Letters of the name of a model: file systems take 255, with `_design.c` and the like."""
 
 
-class Draft:
+class ModelBuilder:
     """Owner of the parts of a model; `Model` adds what a page may say."""
 
     _unused = 'its residual is zero; if that is meant, say idle=["..."] in m.nodal_unknowns'
@@ -508,7 +508,18 @@ class Draft:
         return cells.foreign(rule, nodes)
 
     def finish(self) -> Definition:
-        """The frozen definition of the model."""
+        """Return the definition of the model.
+
+        Returns
+        -------
+        Definition
+            The model, for `softehl.load_kernel` and `Study.add`.
+
+        Raises
+        ------
+        ModelError
+            The model has no residual, or declares something that it does not use.
+        """
         potential, constant = self._equations.total()
         self._check_use(potential)
         a, o = self._arguments, self._outputs

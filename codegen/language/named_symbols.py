@@ -3,8 +3,9 @@
 The result of `Model.define` stands for an expression.  To SymPy a plain symbol would be a constant:
 `sp.diff(W, x)` of a W that uses a name of something with x in it would lose a term, and so would
 `subs`.  A `Name` follows its definition there, or refuses where it has none (a local unknown, an
-integral, ...).  `Written` does the same in another way, for the second reading of a page by which
-its kernels are checked: the definition stands in the tree of the expression, where SymPy finds it.
+integral, ...).  `ExpandedName` does the same in another way, for the second reading of a page by
+which its kernels are checked: the definition stands in the tree of the expression, where SymPy
+finds it.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def named(
     """The name of `value`, an expression or several; not `known`: it only depends on them."""
     values = [sp.sympify(v) for v in (value if isinstance(value, (list, tuple)) else [value])]
     if known and _WRITTEN.get() and not given:
-        return Written(label, values[0])
+        return ExpandedName(label, values[0])
     below = {s for v in values for s in _direct(v)} | set(given or ())
     return Name(label, values[0] if known else None, below, given)
 
@@ -236,7 +237,7 @@ sp.Expr.is_constant = _undecided(sp.Expr.is_constant)
 Name.__name__ = "Symbol"
 
 
-class Written(sp.Expr):  # type: ignore[misc]
+class ExpandedName(sp.Expr):  # type: ignore[misc]
     """A label and its definition, which SymPy sees."""
 
     is_Atom = True  # nothing is expanded inside
@@ -246,8 +247,8 @@ class Written(sp.Expr):  # type: ignore[misc]
     _slopes: dict[Any, Any]
     _free: set[Any] | None
 
-    def __new__(cls, label: Any, definition: Any) -> Written:
-        self: Written = sp.Expr.__new__(cls, Str(str(label)), definition)
+    def __new__(cls, label: Any, definition: Any) -> ExpandedName:
+        self: ExpandedName = sp.Expr.__new__(cls, Str(str(label)), definition)
         self._slopes, self._free = {}, None
         return self
 
@@ -268,7 +269,7 @@ class Written(sp.Expr):  # type: ignore[misc]
             self._free = set(self.definition.free_symbols)
         return self._free
 
-    def doit(self, **_: Any) -> Written:
+    def doit(self, **_: Any) -> ExpandedName:
         """Itself."""
         return self
 

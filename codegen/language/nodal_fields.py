@@ -29,7 +29,7 @@ CORNERS = {
 """The linear element with the corners of one of higher order."""
 
 
-class Nodal(Fields):
+class NodalFields(Fields):
     """Values are sums over nodes, densities are integrated over the parent cell."""
 
     def __init__(

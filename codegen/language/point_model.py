@@ -22,7 +22,7 @@ from softehl.codegen.language.fields import AXISYMMETRIC, Fields, Traced
 from softehl.codegen.language.flatten import Entries
 
 
-class Site(Fields):
+class PointModel(Fields):
     """Values and gradients are unknowns, densities are per volume and stay what they are."""
 
     def __init__(self, name: str, cell: Element, geometry: str, doc: str) -> None:

@@ -18,7 +18,7 @@ from softehl.codegen.graph.value_domain import Domain, decidable
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.flatten import Entries
 from softehl.codegen.language.named_symbols import named
-from softehl.codegen.language.sympy_tape import Record
+from softehl.codegen.language.sympy_tape import SympyTape
 
 _FUNCTIONS: dict[type, Op] = {
     sp.log: Op.LOG,
@@ -305,7 +305,7 @@ class Symbols:
     def __init__(self, model: str) -> None:
         self.model = model
         self.graph = Graph()
-        self.record = Record()
+        self.record = SympyTape()
         self.bound: dict[sp.Symbol, Node] = {}
         self.lower = Lowering(self.graph, self.bound)
         self._by_label: dict[str, Any] = {}

@@ -53,7 +53,7 @@ class Slope:
 
 
 @dataclass
-class Record:
+class SympyTape:
     """The page: what each name means, potentials with what they freeze, fields, history.
 
     `inputs` holds array and index of every argument; names not in `meanings` are arguments.

@@ -10,11 +10,11 @@ from typing import Any, Literal, TypeVar, get_args, overload
 from softehl.codegen.elements import quadrature
 from softehl.codegen.elements.cells import Element, element
 from softehl.codegen.elements.quadrature import QuadratureRule
-from softehl.codegen.language.boundary_model import Side
-from softehl.codegen.language.cell_model import Whole
+from softehl.codegen.language.boundary_model import BoundaryModel
+from softehl.codegen.language.cell_model import CellModel
 from softehl.codegen.language.definition import Definition, PointForm
 from softehl.codegen.language.errors import Empty, ModelError, NeedsElement
-from softehl.codegen.language.facet_model import FACES, Facet, shape_of
+from softehl.codegen.language.facet_model import FACES, FacetModel, shape_of
 from softehl.codegen.language.fields import (
     AXISYMMETRIC,
     GEOMETRIES,
@@ -23,7 +23,7 @@ from softehl.codegen.language.fields import (
     order_of,
 )
 from softehl.codegen.language.flatten import applied
-from softehl.codegen.language.point_model import Site
+from softehl.codegen.language.point_model import PointModel
 
 T = TypeVar("T")
 Write = Callable[[Fields], Any]
@@ -122,7 +122,7 @@ class Page:
             return self._on_facet(name, kind, chosen, facet)
         if space_of(chosen, kind.dimension) > kind.dimension:
             degree = self.degree or 2 * order_of(kind)
-            side = Side(name, kind, chosen, rule_of(kind, degree), self.doc)
+            side = BoundaryModel(name, kind, chosen, rule_of(kind, degree), self.doc)
             return self._made(side, side.finish)
         try:
             point = self._at_point(name, kind, chosen)
@@ -130,7 +130,7 @@ class Page:
             if self.form == "point":
                 raise
             point = None
-        whole = Whole(name, kind, chosen, self.rule(kind, point), self.doc)
+        whole = CellModel(name, kind, chosen, self.rule(kind, point), self.doc)
         made = self._made(whole, whole.finish)
         unroll = False if self.form == "point" else None
         at = None if self.form == "whole" else point
@@ -142,7 +142,7 @@ class Page:
             raise PlaceError(f'no facet "{facet}" of {kind.name}: "interior" or "side"')
         face = element(FACES[shape_of(kind)])
         rule = rule_of(face, self.degree or 2 * order_of(kind))
-        on = Facet(name, kind, geometry, rule, self.doc, both=facet == "interior")
+        on = FacetModel(name, kind, geometry, rule, self.doc, both=facet == "interior")
         return replace(self._made(on, on.finish), cell=f"{kind.name}_{facet}")
 
     def definitions(self, on: On) -> list[Definition]:
@@ -199,7 +199,7 @@ class Page:
         return self._at_point(self.name, kind, geometry_of(kind.dimension, geometry))
 
     def _at_point(self, name: str, kind: Element, geometry: str) -> PointForm:
-        site = Site(name, kind, geometry, self.doc)
+        site = PointModel(name, kind, geometry, self.doc)
         return self._made(site, site.form)
 
     def _made(self, onto: Fields, finish: Callable[[], T]) -> T:

@@ -19,7 +19,7 @@ from softehl.codegen.graph.graph import Input
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.verify.arithmetics import Exact, Rounded
 from softehl.codegen.verify.kernel_batch import Batch, Vector
-from softehl.codegen.verify.reference_evaluator import Evaluator, NotRealError, Page
+from softehl.codegen.verify.reference_evaluator import Evaluator, NotRealError, ReferenceTasks
 from softehl.codegen.verify.sympy_program import program
 
 BOUND = 1e-10
@@ -134,7 +134,7 @@ class Comparison:
     ) -> None:
         unclear = False
         try:
-            view = _View(self.d, called, e, left, Page(self.exact, called.states[e]))
+            view = _View(self.d, called, e, left, ReferenceTasks(self.exact, called.states[e]))
             for task in tasks:
                 error = view.error(task)
                 if not error <= BOUND:
@@ -157,7 +157,7 @@ class Comparison:
         if digits > LOST:
             return None
         try:
-            page = Page(self.rounded, view.page.state)
+            page = ReferenceTasks(self.rounded, view.page.state)
             spread = max(doubles, view.spread(task, page))
         except NotRealError:
             return None if far else 0.0
@@ -167,7 +167,9 @@ class Comparison:
 class _View:
     """One element of a batch and the page at its state."""
 
-    def __init__(self, d: Definition, called: Batch, e: int, left: list[Vector], page: Page):
+    def __init__(
+        self, d: Definition, called: Batch, e: int, left: list[Vector], page: ReferenceTasks
+    ):
         self.d, self.called, self.e, self.left, self.page = d, called, e, left, page
         self._known: dict[Any, Vector] = {}
         self._rows: Vector | None = None
@@ -179,7 +181,7 @@ class _View:
         errors = [abs(a - b) / s for a, b, s in zip(found, exact, scale, strict=True)]
         return max(map(finite, errors), default=0.0)
 
-    def spread(self, task: str, other: Page) -> float:
+    def spread(self, task: str, other: ReferenceTasks) -> float:
         """Largest difference between the page and another evaluation of it, over the scale."""
         exact = self.expected(task, self.page)
         given = self.expected(task, other)
@@ -229,14 +231,14 @@ class _View:
         w = self.called.along[self.e]
         return [[K[n * i + j] * w[j] for j in range(n)] for i in range(n)]
 
-    def expected(self, task: str, page: Page) -> Vector:
+    def expected(self, task: str, page: ReferenceTasks) -> Vector:
         """Values of the page, in the order of the kernel."""
         key = (id(page), task)
         if key not in self._known:
             self._known[key] = [_double(v) for v in self._expected(task, page)]
         return self._known[key]
 
-    def _expected(self, task: str, page: Page) -> Sequence[Any]:
+    def _expected(self, task: str, page: ReferenceTasks) -> Sequence[Any]:
         match task:
             case abi.Task.ENERGY:
                 return [page.energy()]

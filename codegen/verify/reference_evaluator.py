@@ -7,7 +7,7 @@ with differences for slopes. Nothing of the compiler is used.
 A value that is not real is None, and so is what needs it; the side of a branch that is not taken
 may be None.
 
-`Page` has the results of the tasks of a kernel, by differences of these values.
+`ReferenceTasks` has the results of the tasks of a kernel, by differences of these values.
 """
 
 from __future__ import annotations
@@ -387,7 +387,7 @@ def _in_digits(function: Callable[P, T]) -> Callable[P, T]:
     return inside
 
 
-class Page:
+class ReferenceTasks:
     """The page at one state; `exact.NotRealError` where it has no real value.
 
     Every result is that of a task; `along` are combinations of rows.

@@ -17,7 +17,14 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanAtom
 
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.sympy_tape import Implicit, Integral, Local, Principal, Record, Slope
+from softehl.codegen.language.sympy_tape import (
+    Implicit,
+    Integral,
+    Local,
+    Principal,
+    Slope,
+    SympyTape,
+)
 
 ARRAYS = ("coordinates", "dofs", "data", "parameters")
 """Arrays of arguments that are the same for all points."""
@@ -115,7 +122,7 @@ SATURATING = frozenset(
 class _Builder:
     """Slots of expressions, each made once."""
 
-    def __init__(self, record: Record) -> None:
+    def __init__(self, record: SympyTape) -> None:
         self.record = record
         self.steps: list[Step] = []
         self.switches: list[Switch] = []

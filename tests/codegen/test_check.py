@@ -24,7 +24,7 @@ from softehl.codegen.tools.build import LIBRARY
 from softehl.codegen.verify import random_states, verification
 from softehl.codegen.verify.arithmetics import Exact
 from softehl.codegen.verify.graph_oracle import Oracle
-from softehl.codegen.verify.reference_evaluator import Evaluator, Page
+from softehl.codegen.verify.reference_evaluator import Evaluator, ReferenceTasks
 from softehl.codegen.verify.sympy_program import program
 
 Rule = Callable[[Graph, Node, tuple[Node, ...]], Node]
@@ -177,7 +177,7 @@ def test_page_and_graph_say_the_same(family: str) -> None:
     d = ALL[family]()
     (state,) = random_states.admissible(d, 1)
     along = [[1.0 + k / 7 for k in range(len(state.dofs))]]
-    page, oracle = Page(Evaluator(program(d), Exact()), state), Oracle(d)
+    page, oracle = ReferenceTasks(Evaluator(program(d), Exact()), state), Oracle(d)
     pairs = [
         (page.energy(), oracle.potential(state)),
         (page.residual(along)[0], oracle.residual(state, along)[0]),

@@ -14,7 +14,7 @@ from itertools import product
 from typing import Any
 
 from softehl.codegen.emit.points.c_lines import Lines
-from softehl.codegen.emit.points.point_function import Outputs
+from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_layout import Layout
 from softehl.codegen.language.definition import Component, Quantity
 
@@ -27,7 +27,7 @@ class Parent:
     """Moduli by values and parent slopes: the array S of a point."""
 
     layout: Layout
-    outputs: Outputs
+    outputs: PointOutputs
 
     @property
     def symmetric(self) -> bool:
@@ -102,7 +102,7 @@ class Parent:
         return [q for q in self.quantities if q.component == c]
 
 
-def pulled_back(out: Lines, layout: Layout, outputs: Outputs) -> None:
+def pulled_back(out: Lines, layout: Layout, outputs: PointOutputs) -> None:
     """S of the point q: w T A T^T, where T turns slopes into parent slopes."""
     parent, D = Parent(layout, outputs), range(layout.dimension)
     for k in D:

@@ -10,7 +10,7 @@ from softehl.codegen.emit.batch_functions import widths
 from softehl.codegen.emit.c_printer import design_width
 from softehl.codegen.emit.points import point_function
 from softehl.codegen.emit.points.c_lines import Lines
-from softehl.codegen.emit.points.point_function import Outputs
+from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_layout import Layout, Needs, orders
 from softehl.codegen.language.definition import Component, Quantity
 
@@ -23,7 +23,7 @@ class Frame:
     fluxes go to nodes. first_dof: unknowns in a variation come after so many entries.
     """
 
-    def __init__(self, layout: Layout, task: str, outputs: Outputs) -> None:
+    def __init__(self, layout: Layout, task: str, outputs: PointOutputs) -> None:
         self.layout, self.task, self.outputs = layout, task, outputs
         self.needs = Needs.of(outputs.entries)
         self.out = Lines()

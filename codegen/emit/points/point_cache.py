@@ -10,8 +10,8 @@ from softehl.codegen.abi import Task
 from softehl.codegen.emit.points import parent_map, point_function
 from softehl.codegen.emit.points.c_lines import Lines, load
 from softehl.codegen.emit.points.loop_nest import Frame, products
-from softehl.codegen.emit.points.point_function import Outputs
-from softehl.codegen.emit.points.point_inputs import Inputs
+from softehl.codegen.emit.points.point_function import PointOutputs
+from softehl.codegen.emit.points.point_inputs import PointInputs
 from softehl.codegen.emit.points.point_layout import Layout
 
 
@@ -20,7 +20,7 @@ class Kept:
     """The inverse Jacobian, the volume, and the inputs of the function of the point."""
 
     layout: Layout
-    outputs: Outputs
+    outputs: PointOutputs
 
     @cached_property
     def frame(self) -> Frame:
@@ -56,7 +56,7 @@ class Kept:
         out.open(f"for (int q = 0; q < {points}; ++q)")
         products(f)
         parent_map.write(f)
-        Inputs(f).write(direction=False)
+        PointInputs(f).write(direction=False)
         out.idle("x", "g", "e", "b")
         out.add(f"softehl_wide *const to = (softehl_wide *)R + {count} * q;")
         for k, value in enumerate(self.names):

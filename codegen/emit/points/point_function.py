@@ -21,7 +21,7 @@ _NAMES = {"coordinates": "X", "dofs": "d", "data": "a", "point data": "b", "dire
 
 
 @dataclass(frozen=True, eq=False)
-class Outputs:
+class PointOutputs:
     """Outputs of a task and their places: the arrays P and A of the function.
 
     moduli: number in A by row and column, of those that are not zero; of symmetric ones the upper
@@ -77,7 +77,7 @@ def name(layout: Layout, task: str) -> str:
     return f"{abi.function_name(layout.d.name, task)}_{layout.place_of_points}"
 
 
-def text(layout: Layout, task: str, outputs: Outputs, plan: Schedule) -> tuple[str, int]:
+def text(layout: Layout, task: str, outputs: PointOutputs, plan: Schedule) -> tuple[str, int]:
     """C text of the function and the number of its temporaries.
 
     It returns the lanes in which a local iteration has failed.

@@ -13,7 +13,7 @@ from softehl.codegen.language.definition import Component, Quantity
 
 
 @dataclass(frozen=True, eq=False)
-class Inputs:
+class PointInputs:
     """The arguments of the function of a point, as lines of the frame `f`."""
 
     f: Frame

@@ -33,8 +33,8 @@ from softehl.codegen.emit.points import (
 from softehl.codegen.emit.points.btab import STEM, Pair, Parent, pulled_back, ranks
 from softehl.codegen.emit.points.c_lines import Lines, load, store
 from softehl.codegen.emit.points.loop_nest import Frame, components, products, to_nodes
-from softehl.codegen.emit.points.point_function import Outputs
-from softehl.codegen.emit.points.point_inputs import Inputs
+from softehl.codegen.emit.points.point_function import PointOutputs
+from softehl.codegen.emit.points.point_inputs import PointInputs
 from softehl.codegen.emit.points.point_layout import Layout, orders
 from softehl.codegen.graph.graph import Op
 from softehl.codegen.graph.traversal import reachable
@@ -58,7 +58,7 @@ class Centroid(Frame):
         out.add("enum { q = 0 };")
         products(self)
         parent_map.write(self)
-        Inputs(self).write()
+        PointInputs(self).write()
         out.add(f"V A[{max(len(outputs.moduli), rates, 1)}];")
         call = point_function.name(layout, self.task)
         out.add(f"failed |= {call}(parameters, x, g, e, b, t, c, A);")
@@ -89,9 +89,9 @@ class Group(Frame):
         self,
         layout: Layout,
         task: str,
-        outputs: Outputs,
+        outputs: PointOutputs,
         pairs: str = "",
-        centroid: Outputs | None = None,
+        centroid: PointOutputs | None = None,
     ) -> None:
         """pairs: name of the function that makes tangents of moduli. centroid: of its function."""
         super().__init__(layout, task, outputs)
@@ -107,7 +107,7 @@ class Group(Frame):
         self.out.open(f"for (int q = 0; q < {self.layout.points}; ++q)")
         products(self)
         parent_map.write(self)
-        Inputs(self).write()
+        PointInputs(self).write()
         self._call()
         self.out.close()
         if self.task == Task.TANGENT:
@@ -202,7 +202,7 @@ _SHORT = 65536
 _NAME = f"{PREFIX}_{STEM}"
 
 
-def file(layout: Layout, outputs: Outputs) -> tuple[str, str]:
+def file(layout: Layout, outputs: PointOutputs) -> tuple[str, str]:
     """Name of the function and text of its file."""
     body = _body(layout, outputs)
     tables = "\n".join(cell_constants.used(layout, body, STEM))
@@ -214,7 +214,7 @@ def file(layout: Layout, outputs: Outputs) -> tuple[str, str]:
     return name, text
 
 
-def declaration(name: str, layout: Layout, outputs: Outputs) -> str:
+def declaration(name: str, layout: Layout, outputs: PointOutputs) -> str:
     """Prototype: moduli of every point of a group of elements, tangents of these.
 
     With values at the centroid also, for each, derivatives of forces by it and its own by the
@@ -226,7 +226,7 @@ def declaration(name: str, layout: Layout, outputs: Outputs) -> str:
     return f"void {name}(V (*restrict S)[{parent.size}], {more}double *restrict K)"
 
 
-def _body(layout: Layout, outputs: Outputs) -> str:
+def _body(layout: Layout, outputs: PointOutputs) -> str:
     out, parent = Lines(), Parent(layout, outputs)
     count = len(layout.d.unknowns) ** 2
     kept = "static _Thread_local " if count > _SHORT else ""  # a stack has no room for it
@@ -311,7 +311,7 @@ def _store_by_ranks(out: Lines, layout: Layout, *, symmetric: bool) -> None:
 
 
 @dataclass(frozen=True)
-class Written:
+class KernelText:
     """C text of a kernel, the number of its temporaries, and a file that pages share, if any."""
 
     text: str
@@ -323,11 +323,11 @@ class Written:
 class At:
     """Outputs at the points or at the centroid, and statements in their order."""
 
-    outputs: Outputs
+    outputs: PointOutputs
     plan: Schedule
 
 
-def kernel(layout: Layout, task: str, point: At, centroid: At | None) -> Written:
+def kernel(layout: Layout, task: str, point: At, centroid: At | None) -> KernelText:
     """The functions of the point and the centroid, the loops of the cell, and the batch."""
     text, temporaries = point_function.text(layout, task, point.outputs, point.plan)
     pieces, name, shared = [text], "", None
@@ -340,7 +340,7 @@ def kernel(layout: Layout, task: str, point: At, centroid: At | None) -> Written
         pieces.insert(0, f"{declaration(name, layout, point.outputs)};\n")
     values = None if centroid is None else centroid.outputs
     pieces.append(Group(layout, task, point.outputs, name, values).text())
-    return Written("\n".join(pieces), temporaries, shared)
+    return KernelText("\n".join(pieces), temporaries, shared)
 
 
 SAVED = 0.35
@@ -361,7 +361,7 @@ class Choice:
     why: str
 
 
-def choose(layout: Layout, tangent: Outputs, operations: int, short: int) -> Choice:
+def choose(layout: Layout, tangent: PointOutputs, operations: int, short: int) -> Choice:
     """The form of a page. operations: of the moduli at a point; short: up to which whole pays.
 
     tangent: moduli that are not zero.
@@ -381,7 +381,7 @@ def choose(layout: Layout, tangent: Outputs, operations: int, short: int) -> Cho
     return Choice(whole > limit, f"{told}, limit {limit}")
 
 
-def multiply_adds(layout: Layout, tangent: Outputs) -> int:
+def multiply_adds(layout: Layout, tangent: PointOutputs) -> int:
     """Multiply-adds of B^T S B at one point, pair by pair of nodes."""
     parent = Parent(layout, tangent)
     total, found = 0, orders(parent.quantities)

@@ -19,7 +19,7 @@ from softehl.codegen.language.weak_form import rule_of
 
 
 @dataclass(frozen=True)
-class Place:
+class StridedEntries:
     """Entries of a component in an array of the element: start + stride * node."""
 
     start: int
@@ -78,7 +78,7 @@ class Layout:
         some = [q for k, q in enumerate(self.form.all) if k not in self.form.centroid]
         return list(dict.fromkeys(q.component for q in some))
 
-    def place(self, c: Component) -> Place:
+    def place(self, c: Component) -> StridedEntries:
         """Place of a component among the unknowns, or the data, of the element."""
         if c.given:
             names = [a.name for a in self.d.data]
@@ -87,7 +87,7 @@ class Layout:
             numbers = [k for k, (name, _) in enumerate(self.d.places) if name == c.name]
         stride = numbers[1] - numbers[0] if len(numbers) > 1 else 1
         assert all(n == numbers[0] + stride * a for a, n in enumerate(numbers))
-        return Place(numbers[0], stride)
+        return StridedEntries(numbers[0], stride)
 
     def field(self, c: Component) -> int:
         """Unknowns before those of the field that a component belongs to."""

@@ -32,7 +32,7 @@ from softehl.codegen.emit.points import cell_constants, point_function
 from softehl.codegen.emit.points.c_lines import Lines
 from softehl.codegen.emit.points.loop_nest import components
 from softehl.codegen.emit.points.point_cache import Kept
-from softehl.codegen.emit.points.point_function import Outputs
+from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_layout import Layout
 from softehl.codegen.emit.points.sum_factorisation_1d import Table, lagrange, sweep
 from softehl.codegen.language.definition import Component, Quantity
@@ -150,7 +150,7 @@ class Factored:
     """The functions of a page whose product at a point has these outputs."""
 
     layout: Layout
-    outputs: Outputs
+    outputs: PointOutputs
     plan: Schedule
 
     def text(self, before: list[str]) -> str:
