@@ -13,7 +13,7 @@ from itertools import groupby
 
 from softehl.codegen import abi
 from softehl.codegen.emit.code_motion import If, Same, Schedule, Statement, flat
-from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Place, Routine
+from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.language.definition import Definition
 
 WIDTH = 100
@@ -268,7 +268,7 @@ class Printer:
         self.line(depth, f"failed |= {name}((const double[]){{{operands}}}, {self.ref(n)});")
 
     def expression(self, n: Node) -> str:
-        if isinstance(n.payload, Place):
+        if isinstance(n.payload, ResultIndex):
             return f"{self.ref(n.args[0])}[{n.payload.index}]"
         if n.op is Op.POW:
             return f"pow({self.ref(n.args[0])}, {number(float(n.payload))})"  # type: ignore[arg-type]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Place, Routine
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.guarded_products import guarded, plus
 from softehl.codegen.graph.traversal import reachable
 
@@ -169,7 +169,7 @@ class Divided:
 
     def _result(self, n: Node) -> Node:
         call, routine = n.args[0], n.args[0].payload
-        assert isinstance(n.payload, Place)
+        assert isinstance(n.payload, ResultIndex)
         assert isinstance(routine, Routine)
         if call not in self.calls:
             self.calls[call] = routine.divided(self, call)

@@ -15,7 +15,7 @@ from typing import Any
 import mpmath
 from mpmath.libmp import NoConvergence
 
-from softehl.codegen.graph.graph import Input, Node, Op, Place, Routine
+from softehl.codegen.graph.graph import Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.precise_arithmetic import arctangent, number
 from softehl.codegen.graph.routines import Inverse, Isotropic, Newton, depends
 from softehl.codegen.graph.traversal import Recursion, reachable, recursion
@@ -154,7 +154,7 @@ def _value_at(value: Node, at: dict[Node, Any]) -> Any:
 
 def _operation(n: Node, args: Vector) -> Any:
     if n.op is Op.ITEM:
-        assert isinstance(n.payload, Place)
+        assert isinstance(n.payload, ResultIndex)
         return args[0][n.payload.index]
     if n.op is Op.CALL:
         assert isinstance(n.payload, Routine)
@@ -294,7 +294,7 @@ class Walk:
                     operands.append((yield self._at(a, q)))
                 return results(n.payload, operands, _local)
             case Op.ITEM:
-                assert isinstance(n.payload, Place)
+                assert isinstance(n.payload, ResultIndex)
                 return (yield self._at(n.args[0], q))[n.payload.index]
             case Op.POW:
                 e: Any = n.payload

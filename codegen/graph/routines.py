@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from softehl.codegen.graph.differentiation import gradient
 from softehl.codegen.graph.divided_difference import Divided, exchanged
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, Place, Routine
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.guarded_products import guarded, plus
 from softehl.codegen.graph.partial_derivatives import DifferentiationError
 from softehl.codegen.graph.traversal import reachable, substitute, written_out
@@ -91,12 +91,12 @@ def items(g: Graph, call: Node) -> list[Node]:
     """All results of a call."""
     routine = call.payload
     assert isinstance(routine, Routine)
-    return [g.node(Op.ITEM, (call,), Place(k)) for k in range(routine.outputs)]
+    return [g.node(Op.ITEM, (call,), ResultIndex(k)) for k in range(routine.outputs)]
 
 
 def place(item: Node) -> int:
     """Position of a result."""
-    assert isinstance(item.payload, Place)
+    assert isinstance(item.payload, ResultIndex)
     return item.payload.index
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Place, Routine
+from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.traversal import reachable
 from softehl.errors import SoftehlError
 
@@ -29,7 +29,7 @@ PAYLOAD: dict[Op, type] = {
     Op.INPUT: Input,
     Op.NAME: str,
     Op.CALL: Routine,
-    Op.ITEM: Place,
+    Op.ITEM: ResultIndex,
 }
 
 
