@@ -277,14 +277,14 @@ FAULTS = (
     ),
     Fault(
         "runtime/solve/continuation.py",
-        "before**2 / (now**2 - before**2)",
-        "before / (now - before)",
+        "previous**2 / (latest**2 - previous**2)",
+        "previous / (latest - previous)",
         "tests/runtime/test_continuation.py",
     ),
     Fault(
         "runtime/solve/newton.py",
-        "return before <= now <= self.stagnation",
-        "return now <= self.stagnation",
+        "return previous <= latest <= self.stagnation",
+        "return latest <= self.stagnation",
         "tests/runtime/test_newton.py",
     ),
     Fault(

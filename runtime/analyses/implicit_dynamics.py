@@ -21,7 +21,14 @@ from softehl.runtime.analyses.time_stepping import ROUNDING, towards
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import Step
-from softehl.runtime.solve.continuation import End, Record, StepRule, Trial, Way, walk
+from softehl.runtime.solve.continuation import (
+    End,
+    PathLog,
+    StepAttempt,
+    Stepper,
+    StepRule,
+    path_points,
+)
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point, Solution, Status
 
@@ -60,8 +67,8 @@ class Implicit:
 
         end: equations without inertia of a step that ended at the beginning, if there was one.
         """
-        log, way = Record("t"), _Way(self, body, begin, until, Ledger(body.share), plain=end)
-        for _ in walk(way, StepRule(self.dt, SMALLEST * self.dt), log):
+        log, way = PathLog("t"), _Way(self, body, begin, until, Ledger(body.share), plain=end)
+        for _ in path_points(way, StepRule(self.dt, SMALLEST * self.dt), log):
             log.points = log.points[-1:]
             if way.result is not None:
                 yield way.result
@@ -78,14 +85,14 @@ class _Tried:
 
 
 @dataclass(eq=False)
-class _Way(Way):
-    """here: where it stands; plain: its equations without inertia; forces, supports: there, (n,),
+class _Way(Stepper):
+    """last: where it stands; plain: its equations without inertia; forces, supports: there, (n,),
     without ties and contacts, and but for averaged ones.
     """
 
     settings: Implicit
     body: Body
-    here: Phase
+    last: Phase
     until: float
     ledger: Ledger
     result: Motion | None = None
@@ -94,17 +101,17 @@ class _Way(Way):
     supports: Array = field(default_factory=lambda: np.empty(0))
     tried: _Tried | None = None
 
-    def start(self) -> Trial:
-        """See `Way`."""
-        here = self.here
+    def start(self) -> StepAttempt:
+        """See `Stepper`."""
+        here = self.last
         end = self.plain or self.body.at_end(here.standing(self.settings.dt), here.v)
         self._stand(end, here, Forces.of(end, here.x, self.body.roles))
         self._energies(end)
-        return Trial.known(here.t, here.x, self.settings.dt)
+        return StepAttempt.solved(here.t, here.x, self.settings.dt)
 
-    def attempt(self, step: float) -> Trial:
+    def attempt(self, step: float) -> StepAttempt:
         """A step in time."""
-        here, scheme = self.here, self.settings.scheme
+        here, scheme = self.last, self.settings.scheme
         dt = towards(self.until - here.t, step)
         state = (dt, here.x, here.v, here.a)
         rate, inertial = scheme.rate(*state), self.body.masked(scheme.inertial(*state))
@@ -125,14 +132,14 @@ class _Way(Way):
                 solution = newton.solve(asked, x)
         solution = replace(solution, x=self.body.weighted(solution.x, self.body.weight))
         self.tried = _Tried(posed, problem)
-        following = min(2.0 * dt, self.settings.dt) if solution.converged else 0.5 * dt
-        return Trial(posed.t, solution, dt, following)
+        next_step = min(2.0 * dt, self.settings.dt) if solution.converged else 0.5 * dt
+        return StepAttempt(posed.t, solution, dt, next_step)
 
-    def accept(self, trial: Trial) -> None:
+    def accept(self, attempt: StepAttempt) -> None:
         """Commit what points remember, and move on."""
         if self.tried is None:
             return
-        here, scheme, tried, x = self.here, self.settings.scheme, self.tried, trial.solution.x
+        here, scheme, tried, x = self.last, self.settings.scheme, self.tried, attempt.solution.x
         state = (tried.step.dt, here.x, here.v, here.a)
         heavy = self.body.heavy
         v = np.where(heavy, scheme.velocity(*state).at(x), 0.0)
@@ -159,24 +166,24 @@ class _Way(Way):
         self.ledger.add(mean, held, moved)
         self.ledger.others += self.body.friction(end, x, moved)
         self.ledger.external += parameter_work(plain, end, self.body.roles, (here.x, x), middle)
-        self.result = self._motion(end, after, trial.solution)
+        self.result = self._motion(end, after, attempt.solution)
 
     def end(self) -> End | None:
-        """See `Way`."""
-        if self.until - self.here.t > ROUNDING * abs(self.until):
+        """See `Stepper`."""
+        if self.until - self.last.t > ROUNDING * abs(self.until):
             return None
-        return Status.CONVERGED, f"reached t = {self.here.t:.9g}"
+        return Status.CONVERGED, f"reached t = {self.last.t:.9g}"
 
     def _stand(self, end: Problem, phase: Phase, forces: Forces) -> None:
-        self.here, self.plain, self.forces = phase, end, forces
+        self.last, self.plain, self.forces = phase, end, forces
         self.supports = _at(end, forces.total + self.body.M @ phase.a)
 
     def _energies(self, end: Problem) -> dict[str, float]:
-        v, x = self.here.v, self.here.x
+        v, x = self.last.v, self.last.x
         kinetic = 0.5 * float(v @ (self.body.M @ v))
         stored = stored_energy(end, x, self.body.roles)
         assert self.forces is not None
-        return self.ledger.told(self.here.t, kinetic, stored, self.forces, x)
+        return self.ledger.told(self.last.t, kinetic, stored, self.forces, x)
 
     def _motion(self, end: Problem, phase: Phase, solution: Solution) -> Motion:
         point, energy = Point(phase.t, solution), self._energies(end)

@@ -22,7 +22,7 @@ from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.linear.factorisation_cache import iterating
 from softehl.runtime.solve.linear.linear_solver import LinearSolver, SingularMatrix
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.singularity_check import FirstStep, Remembering
+from softehl.runtime.solve.singularity_check import LastFactorisation, SupportCheck
 from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point, Status
 
 _NAME = "load factor"
@@ -74,7 +74,7 @@ class _Reached:
     histories: dict[str, Array]
     on_step: Callable[[Result], object]
     keep_all: bool = False
-    kept: Remembering | None = None
+    kept: LastFactorisation | None = None
     before: Trail | None = None
     record: bool = False
     linear: LinearSolver | None = None
@@ -126,7 +126,7 @@ class LoadSteps:
     def run(self, system: System, start: Beginning, until: float) -> Result:
         """The result at load factor `until`.  Raises NotConverged."""
         begin, x0, histories = start
-        first_step = FirstStep(self.newton)
+        first_step = SupportCheck(self.newton)
         kept = first_step.memory if self.record or system.size <= _KEPT else None
         kinds = kept, self.before, self.record, self.newton.linear
         at = _Reached(system, x0, histories, self.on_step, False, *kinds)
@@ -173,7 +173,10 @@ class ArcSteps:
     def run(self, system: System, start: Beginning, until: Callable[[Result], bool]) -> LoadPath:
         """Path of `Study.follow`.  Raises NotConverged."""
         begin, x0, histories = start
-        at, first_step = _Reached(system, x0, histories, self.on_step, True), FirstStep(self.newton)
+        at, first_step = (
+            _Reached(system, x0, histories, self.on_step, True),
+            SupportCheck(self.newton),
+        )
         problem = at.problem_at(begin)
         with np.errstate(all="ignore"):
             require_held(system, problem, x0)

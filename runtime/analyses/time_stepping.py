@@ -23,11 +23,19 @@ from softehl.runtime.equations.system import Step, System
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity.tape import Trail
-from softehl.runtime.solve.continuation import End, Record, StepRule, Trial, Way, through, walk
+from softehl.runtime.solve.continuation import (
+    End,
+    PathLog,
+    StepAttempt,
+    Stepper,
+    StepRule,
+    path_points,
+    polynomial_value,
+)
 from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.linear.factorisation_cache import iterating
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.singularity_check import FirstStep, Remembering
+from softehl.runtime.solve.singularity_check import LastFactorisation, SupportCheck
 from softehl.runtime.solve.solution import NotConverged, Point, Status
 
 Method: TypeAlias = Literal["euler", "bdf2"]
@@ -147,12 +155,12 @@ class March:
         with np.errstate(all="ignore"):
             posed = system.problem(self.posed(system, clock, shortest))
             require_held(system, posed, clock.states[0])
-        first_step, over = FirstStep(self.newton), ROUNDING * length
+        first_step, over = SupportCheck(self.newton), ROUNDING * length
         kept = first_step.memory if self.record else None
         way = _ByTime(self, first_step, system, clock, until, over, kept)
-        log = Record("t")
+        log = PathLog("t")
         marks = {} if checkpoint is None else marks_of(system.everywhere)
-        for _ in walk(way, StepRule(self.dt, SMALLEST * self.dt), log):
+        for _ in path_points(way, StepRule(self.dt, SMALLEST * self.dt), log):
             log.points = log.points[-1:]  # a march may be long
             if way.result is None:
                 continue  # it stands at the start
@@ -208,28 +216,28 @@ class March:
 
 
 @dataclass(eq=False)
-class _ByTime(Way):
+class _ByTime(Stepper):
     """clock: where it stands; over: time left before the end that is none; kept: the linear solver
     of a march that is recorded; result: of the last step, None at the start; again: the last
     attempt failed, so that the next one is as long as it is told.
     """
 
     march: March
-    first_step: FirstStep
+    first_step: SupportCheck
     system: System
     clock: Clock
     until: float
     over: float
-    kept: Remembering | None = None
+    kept: LastFactorisation | None = None
     result: Result | None = None
     again: bool = False
     _tried: tuple[Step, Any] | None = None
 
-    def start(self) -> Trial:
-        """See `Way`."""
-        return Trial.known(self.clock.t, self.clock.states[0], self.clock.dt)
+    def start(self) -> StepAttempt:
+        """See `Stepper`."""
+        return StepAttempt.solved(self.clock.t, self.clock.states[0], self.clock.dt)
 
-    def attempt(self, step: float) -> Trial:
+    def attempt(self, step: float) -> StepAttempt:
         """A step in time; refused where its error is too large."""
         left = self.until - self.clock.t
         dt = step if self.again else towards(left, step)
@@ -239,27 +247,27 @@ class _ByTime(Way):
             guess = _extrapolated(self.clock, posed.t)
             solution = self.first_step.newton.solve(problem, guess)
         self._tried = posed, problem
-        following = 0.5 * dt
+        next_step = 0.5 * dt
         if solution.converged:
             factor = self.march.factor(self.system, self.clock, posed, problem, solution.x)
-            following = self._following(dt, step, factor)
+            next_step = self._next_step(dt, step, factor)
             if factor < 1.0:
                 words = "the local error is above its tolerance"
                 solution = replace(solution, status=Status.REFUSED, message=words)
         self.again = not solution.converged
-        return Trial(posed.t, solution, dt, following)
+        return StepAttempt(posed.t, solution, dt, next_step)
 
-    def accept(self, trial: Trial) -> None:
+    def accept(self, attempt: StepAttempt) -> None:
         """Commit what points remember, and set the clock."""
         if self._tried is None:
             return
-        (posed, problem), solution, system = self._tried, trial.solution, self.system
+        (posed, problem), solution, system = self._tried, attempt.solution, self.system
         self.first_step.check(problem, solution)
         after = system.committed(problem, solution.x, self.clock.histories)
         states = np.vstack([solution.x, self.clock.states])[:3]
         times = (posed.t, *self.clock.times)[:3]
-        assert trial.following is not None
-        self.clock = Clock(times, states, after, trial.following)
+        assert attempt.next_step is not None
+        self.clock = Clock(times, states, after, attempt.next_step)
         problem = problem.at(solution.x)
         before = self.result.trail if self.result else self.march.before
         known = before if self.kept else None, self.kept, iterating(self.march.newton.linear)
@@ -267,12 +275,12 @@ class _ByTime(Way):
         self.result = Result(system, problem, Point(posed.t, solution), after, trail)
 
     def end(self) -> End | None:
-        """See `Way`."""
+        """See `Stepper`."""
         if self.until - self.clock.t > self.over:
             return None
         return Status.CONVERGED, f"reached t = {self.clock.t:.9g}"
 
-    def _following(self, dt: float, step: float, factor: float) -> float:
+    def _next_step(self, dt: float, step: float, factor: float) -> float:
         """Length of the next step after one of length dt, when `step` was offered."""
         if self.march.tolerance is not None:
             return min(max(factor, _CUT), _GROWTH) * dt
@@ -303,4 +311,4 @@ def towards(left: float, dt: float) -> float:
 
 def _extrapolated(clock: Clock, t: float, count: int = 2) -> Array:
     """Unknowns at t on the polynomial through the last states, at most `count` of them."""
-    return through(clock.times[:count], clock.states[:count], t)
+    return polynomial_value(clock.times[:count], clock.states[:count], t)

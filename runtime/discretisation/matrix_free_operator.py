@@ -135,8 +135,8 @@ class Tangent:
     def __abs__(self) -> _Bound:
         return _Bound(self)
 
-    def loosest(self) -> None:
-        """See `Judging`: iterations that converged show that the matrix is regular."""
+    def unconstrained_unknown(self) -> None:
+        """See `JudgesSingularity`: iterations that converged show that the matrix is regular."""
 
     def solve(self, r: Array) -> Array:
         """x of K x = r.  Raises SingularMatrix where the iteration does not get there."""

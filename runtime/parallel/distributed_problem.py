@@ -24,7 +24,7 @@ from softehl.runtime.parallel.partitioning import Part
 from softehl.runtime.parallel.petsc_matrix import Operator, Solver, Tangent
 from softehl.runtime.parallel.static_condensation import Outer
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
-from softehl.runtime.solve.singularity_check import SINGULAR, moving, signs
+from softehl.runtime.solve.singularity_check import SINGULAR, random_signs, without_small_entries
 
 
 @dataclass(eq=False)
@@ -80,17 +80,17 @@ class Factors:
         """Local x, (m,), of own r, (k,)."""
         return self.tangent.solved(self.solver, r)
 
-    def loosest(self) -> int | None:
-        """See `solve.singularity_check.loosest`: PETSc's number. Only a direct solver is asked."""
+    def unconstrained_unknown(self) -> int | None:
+        """See `JudgesSingularity`: PETSc's number, for a direct solver alone."""
         if not self.solver.direct:
             return None
         exchange = self.tangent.exchange
         try:
-            y = self.solve(signs(len(exchange.owned), world().rank))[exchange.owned]
+            y = self.solve(random_signs(len(exchange.owned), world().rank))[exchange.owned]
         except SingularMatrix:
             return None
         most = float(largest(np.abs(y).max(initial=0.0)))
-        y = moving(y, most)
+        y = without_small_entries(y, most)
         resisted = np.abs(self.tangent.times(y)) > SINGULAR * self.tangent.times_magnitudes(
             np.abs(y)
         )

@@ -12,7 +12,7 @@ from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import Step, System
 from softehl.runtime.solve.linear.linear_solver import LinearSolver
-from softehl.runtime.solve.singularity_check import Remembering
+from softehl.runtime.solve.singularity_check import LastFactorisation
 
 
 @runtime_checkable
@@ -43,7 +43,7 @@ class Trail:
     posed: Any
     x: Array
     before: Trail | None = None
-    kept: Remembering | None = None
+    kept: LastFactorisation | None = None
     linear: LinearSolver | None = None
     memo: dict[str, Any] = field(default_factory=dict, repr=False)
 

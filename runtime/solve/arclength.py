@@ -15,13 +15,13 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.solve.continuation import (
     End,
     OnPoint,
+    PathLog,
     ProblemAt,
-    Record,
+    StepAttempt,
+    Stepper,
     StepRule,
-    Trial,
-    Way,
     admissible_fraction,
-    followed,
+    follow_path,
 )
 from softehl.runtime.solve.linear.linear_solver import LinearSolver, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.newton import MeasuredProblem, Newton, NonlinearProblem
@@ -29,13 +29,13 @@ from softehl.runtime.solve.solution import Branch, LimitPoint, Solution, Status
 
 Derivative: TypeAlias = Callable[[float, Array], Array]
 _FOLD_ITERATIONS = 20
-_RESOLUTION = 1e-3
+_SHORTEST_CHORD = 1e-3
 """Of the extent of the path so far: a chord that is shorter passes a kink, whatever its angle. From
 1e-2 to 1e-4 a snap-back and a shallow roof have the same limits, and costs within a tenth."""
-_NARROW = 1e-2
+_MIN_ASPECT_RATIO = 1e-2
 """Least ratio of the sides of that extent: a path may begin along one of them. From 1e-1 to 1e-3
 limits are the same, and costs within a thirtieth."""
-_AIM = 0.5
+_TARGET_ANGLE_FRACTION = 0.5
 """Of the largest angle: at which the next step aims. From 0.5 to 1 the same limits take from 318 to
 435 Newton steps in a snap-back, from 552 to 596 in a shallow roof."""
 
@@ -55,28 +55,30 @@ class DrivenProblem(NonlinearProblem, Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class _Trial(Trial):
+class _ArclengthAttempt(StepAttempt):
     """A point of arc-length continuation, accepted or refused.
 
     t: unit tangent, shape (n + 1,). side: sign of the determinant of the bordered matrix, None
-    where it is not known. leaves: it is the last one, on a bound of the parameter.
+    where it is not known. at_bound: it is the last one, on a bound of the parameter.
     """
 
     t: Array = field(default_factory=lambda: np.empty(0))
     side: float | None = None
-    leaves: bool = False
+    at_bound: bool = False
 
     @property
     def y(self) -> Array:
         return np.append(self.solution.x, self.parameter)
 
-    def refuse(self, status: Status, message: str, following: float | None = None) -> _Trial:
+    def refuse(
+        self, status: Status, message: str, next_step: float | None = None
+    ) -> _ArclengthAttempt:
         solution = replace(self.solution, status=status, message=message)
-        return replace(self, solution=solution, following=following)
+        return replace(self, solution=solution, next_step=next_step)
 
 
 @dataclass(frozen=True, eq=False)
-class _Path:
+class _SolutionCurve:
     """The curve R(x, parameter) = 0 in the space of y = (x, parameter), with a metric."""
 
     problem_at: ProblemAt
@@ -109,12 +111,12 @@ class _Path:
         if self.derivative is not None:
             return self.derivative(parameter, x)
         h = self.difference * max(abs(parameter), self.parameter_scale)
-        ahead = self.problem_at(parameter + h).residual(x)
-        behind = self.problem_at(parameter - h).residual(x)
-        return (ahead - behind) / (2.0 * h)
+        forward = self.problem_at(parameter + h).residual(x)
+        backward = self.problem_at(parameter - h).residual(x)
+        return (forward - backward) / (2.0 * h)
 
     def linearise(self, y: Array) -> tuple[Array, SparseMatrix, Array]:
-        """R at y, dR/dx, and what R changes by per parameter, (n,), prescribed unknowns following.
+        """R at y, dR/dx, and what R changes by per parameter, (n,), prescribed unknowns next_step.
 
         Prescribed unknowns u(parameter) are eliminated from dR/dx, so that the change of the other
         residuals has their share K u'.
@@ -153,22 +155,22 @@ class _Path:
 
 
 @dataclass(frozen=True, eq=False)
-class _Extent:
+class _PathExtent:
     """Extent of a path so far: a box in the plane of |x| and the parameter.
 
     Angles and lengths are those of a diagram of the path that is drawn into this box.
-    begin: (n + 1,) where the path begins. x, parameter: sides of the box in units of the metric,
+    start: (n + 1,) where the path begins. x, parameter: sides of the box in units of the metric,
     zero in the beginning.
     """
 
-    path: _Path
-    begin: Array
+    path: _SolutionCurve
+    start: Array
     x: float = 0.0
     parameter: float = 0.0
 
-    def with_point(self, y: Array) -> _Extent:
+    def with_point(self, y: Array) -> _PathExtent:
         """The box that has a further point in it."""
-        x, parameter = self._sizes(y - self.begin)
+        x, parameter = self._sizes(y - self.start)
         return replace(self, x=max(self.x, x), parameter=max(self.parameter, parameter))
 
     def length(self, dy: Array) -> float:
@@ -189,7 +191,9 @@ class _Extent:
 
     @property
     def _box(self) -> tuple[float, float]:
-        return max(self.x, _NARROW * self.parameter), max(self.parameter, _NARROW * self.x)
+        return max(self.x, _MIN_ASPECT_RATIO * self.parameter), max(
+            self.parameter, _MIN_ASPECT_RATIO * self.x
+        )
 
     def _sizes(self, dy: Array) -> tuple[float, float]:
         weighed = self.path.weigh(dy) * dy
@@ -197,10 +201,10 @@ class _Extent:
 
 
 @dataclass(frozen=True, eq=False)
-class _Corrector:
+class _PlaneEquations:
     """NonlinearProblem in y: R = 0 on the plane `length` along the unit tangent t at `base`."""
 
-    path: _Path
+    path: _SolutionCurve
     base: Array
     covector: Array
     length: float
@@ -223,12 +227,12 @@ class _Corrector:
         return max(problem.norm(r[:-1]), abs(float(r[-1])))
 
     def measure(self, y: Array, K: SparseMatrix | None, *, rounded: bool = False) -> float:
-        problem, off = self._problem(y), abs(float(self._plane(y)[0]))
+        problem, distance = self._problem(y), abs(float(self._plane(y)[0]))
         if isinstance(problem, MeasuredProblem):
             inner = None if K is None else csc_array(csc_array(K)[:-1, :-1])
-            return max(problem.measure(y[:-1], inner, rounded=rounded), off)
+            return max(problem.measure(y[:-1], inner, rounded=rounded), distance)
         r = problem.residual(y[:-1])
-        return max(problem.norm(r), off) if np.isfinite(r).all() else math.inf
+        return max(problem.norm(r), distance) if np.isfinite(r).all() else math.inf
 
     def step_limit(self, y: Array, dy: Array) -> float:
         return self._problem(y).step_limit(y[:-1], dy[:-1])
@@ -330,9 +334,9 @@ class Arclength:
         if not within[0] <= start <= within[1]:
             raise ValueError(f"start {start} lies outside {within}")
         path = self._path(problem_at, derivative)
-        log = Record(self.name, self.keep_all, on_point)
-        return followed(
-            _ByLength(self, path, log, start, x0, direction, within, until, leave),
+        log = PathLog(self.name, self.keep_all, on_point)
+        return follow_path(
+            _ArclengthStepper(self, path, log, start, x0, direction, within, until, leave),
             self.steps,
             log,
         )
@@ -361,150 +365,164 @@ class Arclength:
         """
         return self._path(problem_at, None).response(np.append(x, start), self.newton.linear)
 
-    def _path(self, problem_at: ProblemAt, derivative: Derivative | None) -> _Path:
+    def _path(self, problem_at: ProblemAt, derivative: Derivative | None) -> _SolutionCurve:
         scales = self.x_scale, self.parameter_scale
-        return _Path(problem_at, derivative, *scales, self.difference)
+        return _SolutionCurve(problem_at, derivative, *scales, self.difference)
 
 
 @dataclass(eq=False)
-class _ByLength(Way):
-    """here: where it stands; extent: of the path so far."""
+class _ArclengthStepper(Stepper):
+    """last: where it stands; extent: of the path so far."""
 
     settings: Arclength
-    path: _Path
-    log: Record
-    begin: float
+    path: _SolutionCurve
+    log: PathLog
+    start_parameter: float
     x0: Array
     direction: float
     within: tuple[float, float]
     until: Callable[[Branch], bool] | None
-    leave: Array | None = None
-    here: _Trial | None = None
-    extent: _Extent | None = None
+    initial_direction: Array | None = None
+    last: _ArclengthAttempt | None = None
+    extent: _PathExtent | None = None
 
-    def start(self) -> _Trial:
+    def start(self) -> _ArclengthAttempt:
         """Solve at the start and find the tangent on which the parameter changes as asked."""
         newton = self.settings.newton
-        if self.leave is not None:
-            known = Solution(self.x0, Status.CONVERGED, "", (), 0, 0)
-            return _Trial(self.begin, known, t=self.leave / self.path.length(self.leave))
-        trial = _Trial(self.begin, newton.solve(self.path.problem_at(self.begin), self.x0))
-        along = np.zeros(trial.y.size)
+        if self.initial_direction is not None:
+            solution = Solution(self.x0, Status.CONVERGED, "", (), 0, 0)
+            return _ArclengthAttempt(
+                self.start_parameter,
+                solution,
+                t=self.initial_direction / self.path.length(self.initial_direction),
+            )
+        attempt = _ArclengthAttempt(
+            self.start_parameter, newton.solve(self.path.problem_at(self.start_parameter), self.x0)
+        )
+        along = np.zeros(attempt.y.size)
         along[-1] = math.copysign(1.0 / self.settings.parameter_scale, self.direction)
-        return self._with_tangent(trial, along)
+        return self._with_tangent(attempt, along)
 
-    def attempt(self, step: float) -> _Trial:
+    def attempt(self, step: float) -> _ArclengthAttempt:
         """Predict and correct; onto the bound of the parameter where that is passed."""
-        trial = self._trial(step)
+        trial = self._predict_and_correct(step)
         if trial.converged:
-            trial = self._judged(trial, step)
+            trial = self._check_smoothness(trial, step)
         if not trial.converged or self.within[0] <= trial.parameter <= self.within[1]:
             return trial
         self.log.count(trial.solution)
-        return self._leave(trial)
+        return self._stop_at_bound(trial)
 
-    def accept(self, trial: Trial) -> None:
-        """See `Way`; a fold that was passed is located first."""
-        assert isinstance(trial, _Trial)
-        if self.here is not None and not trial.leaves and _turns(self.here, trial):
-            self.log.limit_points.append(self._locate(self.here, trial))
-        self.here = trial
+    def accept(self, attempt: StepAttempt) -> None:
+        """See `Stepper`; a fold that was passed is located first."""
+        assert isinstance(attempt, _ArclengthAttempt)
+        if self.last is not None and not attempt.at_bound and _passes_fold(self.last, attempt):
+            self.log.limit_points.append(self._locate_fold(self.last, attempt))
+        self.last = attempt
         if self.extent is None:
-            unit = 0.0 if self.leave is None else 1.0  # off a bifurcation the scales are the box
-            self.extent = _Extent(self.path, trial.y, unit, unit)
-        self.extent = self.extent.with_point(trial.y)
+            # off a bifurcation the scales are the box
+            unit = 0.0 if self.initial_direction is None else 1.0
+            self.extent = _PathExtent(self.path, attempt.y, unit, unit)
+        self.extent = self.extent.with_point(attempt.y)
 
     def end(self) -> End | None:
-        """See `Way`."""
-        here, settings = self._here, self.settings
-        if here.leaves or (here.taken and self.until is not None and self.until(self.log.branch())):
-            return Status.CONVERGED, f"reached {settings.name} = {here.parameter:.9g}"
+        """See `Stepper`."""
+        last, settings = self._last, self.settings
+        if last.at_bound or (
+            last.step_length and self.until is not None and self.until(self.log.branch())
+        ):
+            return Status.CONVERGED, f"reached {settings.name} = {last.parameter:.9g}"
         if len(self.log.points) < settings.max_points:
             return None
         endless = self.until is None and math.isinf(self.within[0]) and math.isinf(self.within[1])
-        words = f"{settings.max_points} points, the last at {settings.name} = {here.parameter:.9g}"
-        return Status.CONVERGED if endless else Status.MAX_ITERATIONS, words
+        message = (
+            f"{settings.max_points} points, the last at {settings.name} = {last.parameter:.9g}"
+        )
+        return Status.CONVERGED if endless else Status.MAX_ITERATIONS, message
 
     @property
-    def _here(self) -> _Trial:
-        assert self.here is not None, "start() and accept() come first"
-        return self.here
+    def _last(self) -> _ArclengthAttempt:
+        assert self.last is not None, "start() and accept() come first"
+        return self.last
 
-    def _trial(self, length: float) -> _Trial:
+    def _predict_and_correct(self, length: float) -> _ArclengthAttempt:
         """Predict along the tangent, no further than the problem admits, and correct."""
-        here, newton = self._here, self.settings.newton
-        corrector = _Corrector(self.path, here.y, self.path.weigh(here.t), length)
-        dy = length * here.t
-        end = newton.solve(corrector, here.y + admissible_fraction(corrector, here.y, dy) * dy)
-        trial = _Trial(float(end.x[-1]), replace(end, x=end.x[:-1]), length)
-        return self._with_tangent(trial, corrector.covector)
+        last, newton = self._last, self.settings.newton
+        corrector = _PlaneEquations(self.path, last.y, self.path.weigh(last.t), length)
+        dy = length * last.t
+        end = newton.solve(corrector, last.y + admissible_fraction(corrector, last.y, dy) * dy)
+        attempt = _ArclengthAttempt(float(end.x[-1]), replace(end, x=end.x[:-1]), length)
+        return self._with_tangent(attempt, corrector.covector)
 
-    def _with_tangent(self, trial: _Trial, along: Array) -> _Trial:
+    def _with_tangent(self, attempt: _ArclengthAttempt, along: Array) -> _ArclengthAttempt:
         """The trial with its tangent on the side of `along`; refused if there is none."""
-        if not trial.converged:
-            return trial
-        count = trial.solution.factorisations + 1
-        trial = replace(trial, solution=replace(trial.solution, factorisations=count))
+        if not attempt.converged:
+            return attempt
+        count = attempt.solution.factorisations + 1
+        attempt = replace(attempt, solution=replace(attempt.solution, factorisations=count))
         try:
-            t, side = self.path.tangent(trial.y, along, self.settings.newton.linear)
+            t, side = self.path.tangent(attempt.y, along, self.settings.newton.linear)
         except SingularMatrix as error:
-            return trial.refuse(Status.SINGULAR, f"no tangent of the path: {error}")
-        return replace(trial, t=t, side=side)
+            return attempt.refuse(Status.SINGULAR, f"no tangent of the path: {error}")
+        return replace(attempt, t=t, side=side)
 
-    def _judged(self, trial: _Trial, step: float) -> _Trial:
+    def _check_smoothness(self, attempt: _ArclengthAttempt, step: float) -> _ArclengthAttempt:
         """The trial with the length of the next step; refused if the path between is not smooth."""
-        here, steps, limit = self._here, self.settings.steps, 0.5 * self.settings.turn
+        last, steps, limit = self._last, self.settings.steps, 0.5 * self.settings.turn
         assert self.extent is not None, "accept() comes first"
-        box, chord = self.extent.with_point(trial.y), trial.y - here.y
-        angle = max(box.angle(here.t, chord), box.angle(chord, trial.t))
-        part = _AIM * limit / max(angle, 1e-3 * limit)
-        short = box.length(chord) <= _RESOLUTION or trial.taken <= steps.smallest / steps.cut
-        known = None not in (here.side, trial.side)
-        if (angle <= limit and not (known and here.side != trial.side)) or short:
-            following = steps.after_success(step, trial.taken, trial.solution.iterations)
+        box, chord = self.extent.with_point(attempt.y), attempt.y - last.y
+        angle = max(box.angle(last.t, chord), box.angle(chord, attempt.t))
+        fraction = _TARGET_ANGLE_FRACTION * limit / max(angle, 1e-3 * limit)
+        short = (
+            box.length(chord) <= _SHORTEST_CHORD
+            or attempt.step_length <= steps.smallest / steps.cut
+        )
+        signs_known = None not in (last.side, attempt.side)
+        if (angle <= limit and not (signs_known and last.side != attempt.side)) or short:
+            next_step = steps.after_success(step, attempt.step_length, attempt.solution.iterations)
             if not short:
-                following = min(following, max(part * trial.taken, steps.smallest))
-            return replace(trial, following=following)
-        words = "the number of negative pivots changes"
+                next_step = min(next_step, max(fraction * attempt.step_length, steps.smallest))
+            return replace(attempt, next_step=next_step)
+        message = "the number of negative pivots changes"
         if angle > limit:
-            words = f"the path turned by {angle:.0f} degrees from the chord of the step"
-        following = trial.taken * min(max(part, steps.cut**2), steps.cut)
-        return trial.refuse(Status.DIVERGED, words, following)
+            message = f"the path turned by {angle:.0f} degrees from the chord of the step"
+        next_step = attempt.step_length * min(max(fraction, steps.cut**2), steps.cut)
+        return attempt.refuse(Status.DIVERGED, message, next_step)
 
-    def _leave(self, trial: _Trial) -> _Trial:
+    def _stop_at_bound(self, attempt: _ArclengthAttempt) -> _ArclengthAttempt:
         """The point on the bound that the path crosses before the trial."""
-        here = self._here
-        if _turns(here, trial):
-            return trial.refuse(Status.DIVERGED, "a limit point and the bound within one step")
-        bound = self.within[0] if trial.parameter < self.within[0] else self.within[1]
-        part = (bound - here.parameter) / (trial.parameter - here.parameter)
-        guess = here.y + part * (trial.y - here.y)
+        last = self._last
+        if _passes_fold(last, attempt):
+            return attempt.refuse(Status.DIVERGED, "a limit point and the bound within one step")
+        bound = self.within[0] if attempt.parameter < self.within[0] else self.within[1]
+        fraction = (bound - last.parameter) / (attempt.parameter - last.parameter)
+        guess = last.y + fraction * (attempt.y - last.y)
         solution = self.settings.newton.solve(self.path.problem_at(bound), guess[:-1])
-        return _Trial(bound, solution, trial.taken, leaves=True)
+        return _ArclengthAttempt(bound, solution, attempt.step_length, at_bound=True)
 
-    def _locate(self, here: _Trial, there: _Trial) -> LimitPoint:
+    def _locate_fold(self, left: _ArclengthAttempt, right: _ArclengthAttempt) -> LimitPoint:
         """The fold between the ends, where the tangent has no parameter component (Illinois)."""
-        kind, index = "maximum" if here.t[-1] > 0.0 else "minimum", len(self.log.points)
-        a, slope_a, b, slope_b = 0.0, float(here.t[-1]), there.taken, float(there.t[-1])
-        near = min(here, there, key=lambda end: abs(end.t[-1]))
-        located = self.settings.fold_tolerance * self.settings.parameter_scale
+        kind, index = "maximum" if left.t[-1] > 0.0 else "minimum", len(self.log.points)
+        a, slope_a, b, slope_b = 0.0, float(left.t[-1]), right.step_length, float(right.t[-1])
+        nearest = min(left, right, key=lambda end: abs(end.t[-1]))
+        tolerance = self.settings.fold_tolerance * self.settings.parameter_scale
         for _ in range(_FOLD_ITERATIONS):
-            if abs(near.t[-1]) <= located:
-                return LimitPoint(near.parameter, near.solution.x, kind, index, located=True)
+            if abs(nearest.t[-1]) <= tolerance:
+                return LimitPoint(nearest.parameter, nearest.solution.x, kind, index, located=True)
             c = b - slope_b * (b - a) / (slope_b - slope_a)
-            trial = self._trial(c)
-            self.log.count(trial.solution)
-            if not trial.converged:
+            attempt = self._predict_and_correct(c)
+            self.log.count(attempt.solution)
+            if not attempt.converged:
                 break
-            slope = float(trial.t[-1])
+            slope = float(attempt.t[-1])
             if slope * slope_b < 0.0:
                 a, slope_a = b, slope_b
             else:
                 slope_a *= 0.5
-            b, slope_b, near = c, slope, trial
-        return LimitPoint(near.parameter, near.solution.x, kind, index, located=False)
+            b, slope_b, nearest = c, slope, attempt
+        return LimitPoint(nearest.parameter, nearest.solution.x, kind, index, located=False)
 
 
-def _turns(here: _Trial, there: _Trial) -> bool:
+def _passes_fold(left: _ArclengthAttempt, right: _ArclengthAttempt) -> bool:
     """True if the parameter changes direction between the two points."""
-    return bool(here.t[-1] != 0.0 and here.t[-1] * there.t[-1] <= 0.0)
+    return bool(left.t[-1] != 0.0 and left.t[-1] * right.t[-1] <= 0.0)

@@ -1,9 +1,9 @@
-"""Following a solution path: predict, correct, choose the next step, end with a reason.
+"""Continuation of a solution path: predict, correct, choose the next step, end with a reason.
 
-There is one driver, `walk`. A `Way` makes the steps: by the parameter of the path
+There is one driver, `path_points`. A `Stepper` makes the steps: by the parameter of the path
 (`Continuation`), by its arc length where the parameter turns back (`solve.arclength`), by time
 (`analyses.time_stepping`). Predictors extrapolate the last points, `StepRule` controls the step,
-`Record` logs the path and the reason of its end. A corrector is Newton's method, a relative, or a
+`PathLog` logs the path and the reason of its end. A corrector is Newton's method, a relative, or a
 `Ladder` of them: it escalates within a step, continuation shortens the step.
 """
 
@@ -132,26 +132,26 @@ def goals_of(start: float, stop: float, waypoints: Iterable[float]) -> list[floa
     return sorted(goals - {float(start)}, reverse=stop < start)
 
 
-def next_parameter(here: float, goal: float, step: float) -> float:
+def next_parameter(parameter: float, goal: float, step: float) -> float:
     """Next parameter: the goal itself within a step, half-way within two (no sliver remains)."""
-    remaining = abs(goal - here)
+    remaining = abs(goal - parameter)
     if remaining <= step * (1.0 + _ROUNDING):
         return goal
-    return here + math.copysign(min(step, 0.5 * remaining), goal - here)
+    return parameter + math.copysign(min(step, 0.5 * remaining), goal - parameter)
 
 
 Predictor: TypeAlias = Literal["secant", "parabola", "previous"]
 POINTS: dict[Predictor, int] = {"previous": 1, "secant": 2, "parabola": 3}
 """Number of known points that a predictor uses."""
 
-Guess: TypeAlias = Callable[[Point, float], Array]
-"""Change (n,) from a known point to a parameter, by whoever knows better than its neighbours."""
+UserPredictor: TypeAlias = Callable[[Point, float], Array]
+"""User-supplied predictor: increment (n,) from the last point to a parameter."""
 
 _LONGEST_EXTRAPOLATION = 10.0  # a secant prolonged further mostly amplifies its own error
 _PARABOLA = 2.5  # the same for a parabola, in lengths of the shorter chord
 
 
-def through(times: Sequence[float], states: Iterable[Array], t: float) -> Array:
+def polynomial_value(times: Sequence[float], states: Iterable[Array], t: float) -> Array:
     """Value (n,) at t of the polynomial through the states (n,) at different times (Lagrange)."""
     parts = [
         math.prod((t - b) / (a - b) for b in times if b != a) * state
@@ -160,28 +160,30 @@ def through(times: Sequence[float], states: Iterable[Array], t: float) -> Array:
     return np.asarray(np.sum(parts, axis=0))
 
 
-def extrapolated(known: Sequence[Point], parameter: float) -> Array:
+def extrapolate(points: Sequence[Point], parameter: float) -> Array:
     """Change (n,) from the first of the points to `parameter`, on the polynomial through them all;
     on that of fewer points where it goes further beyond them than they are apart.
     """
-    here, others = known[0], known[1:]
-    t = parameter - here.parameter
-    distances = [point.parameter - here.parameter for point in others]
+    last, others = points[0], points[1:]
+    t = parameter - last.parameter
+    distances = [point.parameter - last.parameter for point in others]
     if len(set(distances)) < len(distances) or 0.0 in distances:
-        return np.zeros_like(here.solution.x)
+        return np.zeros_like(last.solution.x)
     if len(others) == 2 and abs(t) > _PARABOLA * min(abs(d) for d in distances):
-        return extrapolated(known[:2], parameter)
+        return extrapolate(points[:2], parameter)
     if len(others) == 1:
         t = math.copysign(min(abs(t), _LONGEST_EXTRAPOLATION * abs(distances[0])), t)
-    changes = [point.solution.x - here.solution.x for point in known]
-    return through([0.0, *distances], changes, t)
+    changes = [point.solution.x - last.solution.x for point in points]
+    return polynomial_value([0.0, *distances], changes, t)
 
 
-def predicted(predictor: Predictor | Guess, known: Sequence[Point], parameter: float) -> Array:
-    """Change (n,) from the first of the known points to `parameter`."""
+def predict(
+    predictor: Predictor | UserPredictor, points: Sequence[Point], parameter: float
+) -> Array:
+    """Increment (n,) from the first of the points to `parameter`."""
     if callable(predictor):
-        return predictor(known[0], parameter)
-    return extrapolated(known[: POINTS[predictor]], parameter)
+        return predictor(points[0], parameter)
+    return extrapolate(points[: POINTS[predictor]], parameter)
 
 
 def admissible_fraction(problem: NonlinearProblem, x: Array, dx: Array) -> float:
@@ -194,20 +196,20 @@ OnPoint: TypeAlias = Callable[[Point], object]
 End: TypeAlias = tuple[Status, str]
 """End of a path, in code and in words."""
 
-_NEAR, _STEEPER = 2.0, 2.0
+_NEARBY, _STEEPER = 2.0, 2.0
 """A turning point is believed that is foreseen within so many lengths of the step that failed, or
 where the slope has grown by such a factor over the last step.
 """
-_BARRED = {Status.NOT_FINITE, Status.REFUSED}
-_WORDS_OF_THEIR_OWN = {*_BARRED, Status.SINGULAR}
+_NO_TURNING_POINT = {Status.NOT_FINITE, Status.REFUSED}
+_OWN_ADVICE = {*_NO_TURNING_POINT, Status.SINGULAR}
 """Failures of the shortest step that say more than that it was too long."""
 
 
 @dataclass
-class Record:
-    """Record of a path so far: grows with every solve, and ends as a frozen Branch.
+class PathLog:
+    """Log of a path: grows with every solve, and ends as a frozen Branch.
 
-    slopes: change of x with the parameter over each of the last two steps, and where.
+    rates: change of x with the parameter over each of the last two steps, and where.
     """
 
     name: str
@@ -216,7 +218,7 @@ class Record:
     points: list[Point] = field(default_factory=list)
     failures: list[Point] = field(default_factory=list)
     limit_points: list[LimitPoint] = field(default_factory=list)
-    slopes: list[tuple[float, float]] = field(default_factory=list)
+    rates: list[tuple[float, float]] = field(default_factory=list)
     factorisations: int = 0
     iterations: int = 0
     end: End | None = None
@@ -228,11 +230,11 @@ class Record:
         return solution
 
     def accept(self, parameter: float, solution: Solution) -> Point:
-        """Append a converged point, forget the x of the last but two, tell the caller."""
+        """Append a converged point, drop the x of the last but two, call `on_point`."""
         point = Point(parameter, solution)
-        if self.points and (way := parameter - self.points[-1].parameter):
+        if self.points and (increment := parameter - self.points[-1].parameter):
             change = float(np.linalg.norm(solution.x - self.points[-1].solution.x))
-            self.slopes = [*self.slopes[-1:], (parameter - 0.5 * way, change / abs(way))]
+            self.rates = [*self.rates[-1:], (parameter - 0.5 * increment, change / abs(increment))]
         self.points.append(point)
         if len(self.points) > 2 and not self.keep_all:
             old = self.points[-3]
@@ -258,31 +260,36 @@ class Record:
             limit_points=tuple(self.limit_points),
         )
 
-    def no_start(self, start: float, solution: Solution) -> None:
+    def end_no_start(self, start: float, solution: Solution) -> None:
         """End where not even the start was solved."""
         self.refuse(start, solution)
         message = f"no solution at the start, {self.name} = {start:.9g}: {solution.message}"
         self.end = solution.status, message
 
-    def too_small(self, step: float, smallest: float) -> None:
-        """End because the last failure asks for a step below `smallest`; say what stands there."""
-        here, failed = self.points[-1].parameter, self.failures[-1]
-        less = f"the next step would be {step:.2g}, smaller than {smallest:.2g}"
-        words = (
-            f"reached {self.name} = {here:.9g}; {less if step else 'no shorter step is tried'}; "
+    def end_step_too_small(self, step: float, smallest: float) -> None:
+        """End the path, since the next step would be below `smallest`; report the last failure."""
+        parameter, failed = self.points[-1].parameter, self.failures[-1]
+        step_message = f"the next step would be {step:.2g}, smaller than {smallest:.2g}"
+        message = (
+            f"reached {self.name} = {parameter:.9g}; "
+            f"{step_message if step else 'no shorter step is tried'}; "
             f"last attempt, at {failed.parameter:.9g}: "
             f"{failed.solution.status.value} ({failed.solution.message})"
         )
         reason = failed.solution.status
-        fold = None if reason in _BARRED else self._turning_point(failed.parameter - here)
+        fold = (
+            None
+            if reason in _NO_TURNING_POINT
+            else self._turning_point(failed.parameter - parameter)
+        )
         if fold is not None:
-            self.end = Status.TURNING_POINT, f"at about {self.name} = {fold:.5g}; {words}"
+            self.end = Status.TURNING_POINT, f"at about {self.name} = {fold:.5g}; {message}"
         elif step >= smallest:
-            self.end = Status.ROUNDING, words
-        elif reason in _WORDS_OF_THEIR_OWN:
-            self.end = reason, words
+            self.end = Status.ROUNDING, message
+        elif reason in _OWN_ADVICE:
+            self.end = reason, message
         else:
-            self.end = Status.STEP_TOO_SMALL, words
+            self.end = Status.STEP_TOO_SMALL, message
 
     def _turning_point(self, failed: float) -> float | None:
         """The parameter at which the slopes grow beyond all bounds as those of a parabola do:
@@ -290,35 +297,35 @@ class Record:
 
         failed: the last step.
         """
-        if len(self.slopes) < 2:
+        if len(self.rates) < 2:
             return None
-        (a, before), (b, now) = self.slopes
-        if not 0.0 < before < now < math.inf:
+        (a, previous), (b, latest) = self.rates
+        if not 0.0 < previous < latest < math.inf:
             return None
-        fold = b + (b - a) * before**2 / (now**2 - before**2)
-        near = abs(fold - self.points[-1].parameter) <= _NEAR * abs(failed)
-        return fold if near or now >= _STEEPER * before else None
+        fold = b + (b - a) * previous**2 / (latest**2 - previous**2)
+        nearby = abs(fold - self.points[-1].parameter) <= _NEARBY * abs(failed)
+        return fold if nearby or latest >= _STEEPER * previous else None
 
 
 ProblemAt: TypeAlias = Callable[[float], NonlinearProblem]
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
-    """An attempt at the next point of a path, over a step of length `taken`.
+class StepAttempt:
+    """An attempt at the next point of a path, over a step of length `step_length`.
 
-    following: length of the next step where the way knows it better than the step rule does.
+    next_step: length of the next step where the way knows it better than the step rule does.
     """
 
     parameter: float
     solution: Solution
-    taken: float = 0.0
-    following: float | None = None
+    step_length: float = 0.0
+    next_step: float | None = None
 
     @classmethod
-    def known(cls, parameter: float, x: Array, following: float) -> Self:
-        """The start of a path that begins with a state (n,) which needs no solving."""
-        return cls(parameter, Solution(x, Status.CONVERGED, "", (), 0, 0), following=following)
+    def solved(cls, parameter: float, x: Array, next_step: float) -> Self:
+        """Start of a path at a given state (n,), which is not solved for."""
+        return cls(parameter, Solution(x, Status.CONVERGED, "", (), 0, 0), next_step=next_step)
 
     @property
     def converged(self) -> bool:
@@ -326,65 +333,65 @@ class Trial:
         return self.solution.converged
 
 
-class Way(Protocol):
-    """A way to go along a path; it knows where it stands."""
+class Stepper(Protocol):
+    """Stepper of a solution path; it holds the last accepted point."""
 
     @property
     def resolution(self) -> float:
-        """Length of step that is lost in rounding from where it stands."""
+        """Length of a step that is lost in the rounding of the last point."""
         return 0.0
 
-    def start(self) -> Trial:
+    def start(self) -> StepAttempt:
         """The attempt at the start."""
         ...
 
-    def attempt(self, step: float) -> Trial:
-        """A step of at most this length from where the way stands."""
+    def attempt(self, step: float) -> StepAttempt:
+        """A step of at most this length from the last point."""
         ...
 
-    def accept(self, trial: Trial) -> None:
-        """Stand at a trial that has converged, at first that of the start."""
+    def accept(self, attempt: StepAttempt) -> None:
+        """Make a converged attempt the last point; the first one is that of the start."""
         ...
 
     def end(self) -> End | None:
-        """Words and status where the path has come to its end, else None."""
+        """Status and message at the end of the path, else None."""
         ...
 
 
-def walk(way: Way, steps: StepRule, log: Record) -> Iterator[Point]:
+def path_points(stepper: Stepper, steps: StepRule, log: PathLog) -> Iterator[Point]:
     """Converged points in order; afterwards the log has the end."""
-    trial, step = way.start(), steps.first
+    attempt, step = stepper.start(), steps.first
     while log.end is None:
-        log.count(trial.solution)
-        step = _following(steps, step, trial)
-        if trial.converged:
-            way.accept(trial)
-            yield log.accept(trial.parameter, trial.solution)
-            log.end = way.end()
+        log.count(attempt.solution)
+        step = _next_step(steps, step, attempt)
+        if attempt.converged:
+            stepper.accept(attempt)
+            yield log.accept(attempt.parameter, attempt.solution)
+            log.end = stepper.end()
         elif not log.points:
-            log.no_start(trial.parameter, trial.solution)
+            log.end_no_start(attempt.parameter, attempt.solution)
         else:
-            log.refuse(trial.parameter, trial.solution)
-            if step < max(steps.smallest, way.resolution):
-                log.too_small(step, steps.smallest)
+            log.refuse(attempt.parameter, attempt.solution)
+            if step < max(steps.smallest, stepper.resolution):
+                log.end_step_too_small(step, steps.smallest)
         if log.end is None:
-            trial = way.attempt(step)
+            attempt = stepper.attempt(step)
 
 
-def _following(steps: StepRule, step: float, trial: Trial) -> float:
-    """Length of the step after a trial; `step` was asked for."""
-    if trial.following is not None:
-        return trial.following
-    if not trial.converged:
-        return steps.after_failure(trial.taken, trial.solution.status)
-    if not trial.taken:
+def _next_step(steps: StepRule, step: float, attempt: StepAttempt) -> float:
+    """Length of the step after an attempt at a step of length `step`."""
+    if attempt.next_step is not None:
+        return attempt.next_step
+    if not attempt.converged:
+        return steps.after_failure(attempt.step_length, attempt.solution.status)
+    if not attempt.step_length:
         return step
-    return steps.after_success(step, trial.taken, trial.solution.iterations)
+    return steps.after_success(step, attempt.step_length, attempt.solution.iterations)
 
 
-def followed(way: Way, steps: StepRule, log: Record) -> Branch:
+def follow_path(stepper: Stepper, steps: StepRule, log: PathLog) -> Branch:
     """The whole path."""
-    for _ in walk(way, steps, log):
+    for _ in path_points(stepper, steps, log):
         pass
     return log.branch()
 
@@ -411,7 +418,7 @@ class Continuation:
 
     newton: Corrector
     steps: StepRule
-    predictor: Predictor | Guess = "secant"
+    predictor: Predictor | UserPredictor = "secant"
     keep_all: bool = False
     name: str = "parameter"
     starter: Corrector | None = None
@@ -456,49 +463,53 @@ class Continuation:
         ValueError
             A parameter is not finite or lies outside.
         """
-        behind = [] if previous is None else [previous]
-        way = _ByParameter(self, problem_at, start, x0, goals_of(start, stop, waypoints), behind)
-        return followed(way, self.steps, Record(self.name, self.keep_all, on_point))
+        earlier = [] if previous is None else [previous]
+        stepper = _ParameterStepper(
+            self, problem_at, start, x0, goals_of(start, stop, waypoints), earlier
+        )
+        return follow_path(stepper, self.steps, PathLog(self.name, self.keep_all, on_point))
 
 
 @dataclass(eq=False)
-class _ByParameter(Way):
-    """goals: parameters to be hit, in order; known: the last points, latest first."""
+class _ParameterStepper(Stepper):
+    """goals: parameters to be hit, in order; points: the last points, latest first."""
 
     settings: Continuation
     problem_at: ProblemAt
-    begin: float
+    start_parameter: float
     x0: Array
     goals: list[float]
-    known: list[Point]
+    points: list[Point]
 
     @property
     def resolution(self) -> float:
-        """See `Way`."""
-        return float(np.spacing(abs(self.known[0].parameter)))
+        """See `Stepper`."""
+        return float(np.spacing(abs(self.points[0].parameter)))
 
-    def start(self) -> Trial:
-        """See `Way`."""
+    def start(self) -> StepAttempt:
+        """See `Stepper`."""
         corrector = self.settings.starter or self.settings.newton
-        return Trial(self.begin, corrector.solve(self.problem_at(self.begin), self.x0))
+        return StepAttempt(
+            self.start_parameter, corrector.solve(self.problem_at(self.start_parameter), self.x0)
+        )
 
-    def attempt(self, step: float) -> Trial:
+    def attempt(self, step: float) -> StepAttempt:
         """Predict, no further than the problem admits, and correct."""
-        here = self.known[0]
-        parameter = next_parameter(here.parameter, self.goals[0], step)
-        problem, x = self.problem_at(parameter), here.solution.x
-        dx = predicted(self.settings.predictor, self.known, parameter)
+        last = self.points[0]
+        parameter = next_parameter(last.parameter, self.goals[0], step)
+        problem, x = self.problem_at(parameter), last.solution.x
+        dx = predict(self.settings.predictor, self.points, parameter)
         guess = x + admissible_fraction(problem, x, dx) * dx
         solution = self.settings.newton.solve(problem, guess)
-        return Trial(parameter, solution, abs(parameter - here.parameter))
+        return StepAttempt(parameter, solution, abs(parameter - last.parameter))
 
-    def accept(self, trial: Trial) -> None:
-        """See `Way`."""
-        self.known = [Point(trial.parameter, trial.solution), *self.known[:2]]
-        self.goals = self.goals[1:] if trial.parameter in self.goals[:1] else self.goals
+    def accept(self, attempt: StepAttempt) -> None:
+        """See `Stepper`."""
+        self.points = [Point(attempt.parameter, attempt.solution), *self.points[:2]]
+        self.goals = self.goals[1:] if attempt.parameter in self.goals[:1] else self.goals
 
     def end(self) -> End | None:
-        """See `Way`."""
+        """See `Stepper`."""
         if self.goals:
             return None
-        return Status.CONVERGED, f"reached {self.settings.name} = {self.known[0].parameter:.9g}"
+        return Status.CONVERGED, f"reached {self.settings.name} = {self.points[0].parameter:.9g}"

@@ -18,8 +18,10 @@ from softehl.runtime.solve.linear.linear_solver import LinearSolver, SingularMat
 from softehl.runtime.solve.linear.superlu import SuperLU
 from softehl.runtime.solve.solution import Solution, Status
 
-_HARDLY_LESS = 0.5  # of the norm before: Newton does better unless rounding is all that is left
-_FEW = 10.0  # times the tolerance: more than that is iterated on before it counts as rounding
+_SLOW_DECREASE = 0.5  # of the norm before: Newton does better unless rounding is all that is left
+_NEAR_TOLERANCE = (
+    10.0  # times the tolerance: more than that is iterated on before it counts as rounding
+)
 _SUFFICIENT_DECREASE = 1e-4  # Armijo's constant on the norm, the customary value
 
 
@@ -52,11 +54,11 @@ class Corrector(Protocol):
 
 
 @runtime_checkable
-class Informed(Corrector, Protocol):
-    """A corrector that begins from what its last solution left, and may be told of another's."""
+class WarmStartable(Corrector, Protocol):
+    """A corrector that starts from its last solution, or from one of another corrector."""
 
-    def take_up(self, problem: Any, x: Array) -> None:
-        """Go on from a solution x, (n,), of the problem that another corrector found."""
+    def warm_start(self, problem: Any, x: Array) -> None:
+        """Start the next solve from a solution x, (n,), that another corrector found."""
         ...
 
 
@@ -64,8 +66,8 @@ class Informed(Corrector, Protocol):
 class EvolvingProblem(NonlinearProblem, Protocol):
     """A problem whose tangent depends on the iterates so far (its residual must not)."""
 
-    def after(self, before: Array, x: Array) -> Self:
-        """The problem as it is after a step from `before` to x, shapes (n,)."""
+    def after(self, previous: Array, x: Array) -> Self:
+        """The problem as it is after a step from `previous` to x, shapes (n,)."""
         ...
 
 
@@ -190,13 +192,13 @@ class Newton:
             best = state
             LOG.debug("Newton iteration 0: norm %.3e", state.norms[-1])
             while state.status is None:
-                before = state.x
+                previous = state.x
                 state = self.terminate(self.step(problem, state))
                 LOG.debug("Newton iteration %d: norm %.3e", state.iterations, state.norms[-1])
                 if state.norms[-1] < best.norms[-1]:
                     best = state
                 if isinstance(problem, EvolvingProblem):
-                    problem = problem.after(before, state.x)
+                    problem = problem.after(previous, state.x)
         LOG.debug("Newton's method ends: %s, %s", state.status.value, state.message)
         return Solution(
             x=state.x,
@@ -227,8 +229,8 @@ class Newton:
         state = NewtonState(x, (norm_at(problem, x),))
         if math.isfinite(state.norms[0]):
             return state
-        where = _where(problem, x)
-        return _end(state, Status.NOT_FINITE, f"the residual at the start is not finite{where}")
+        where = _not_finite_message(problem, x)
+        return _ended(state, Status.NOT_FINITE, f"the residual at the start is not finite{where}")
 
     def step(self, problem: NonlinearProblem, state: NewtonState) -> NewtonState:
         """Return the state after one iteration: factorise, solve, advance.
@@ -250,7 +252,9 @@ class Newton:
         try:
             dx = -self.linear.factorise(K).solve(r)
         except SingularMatrix as error:
-            return _end(state, Status.SINGULAR, f"{error}{_which(problem, state.x, error)}")
+            return _ended(
+                state, Status.SINGULAR, f"{error}{_singular_message(problem, state.x, error)}"
+            )
         return self._advance(problem, state, dx, K)
 
     def terminate(self, state: NewtonState) -> NewtonState:
@@ -270,20 +274,20 @@ class Newton:
         if state.status is not None:
             return state
         if norm <= self.tolerance:
-            return _end(state, Status.CONVERGED, f"norm {norm:.1e}")
+            return _ended(state, Status.CONVERGED, f"norm {norm:.1e}")
         if self._stagnates(state.norms):
-            return _end(state, Status.CONVERGED, f"norm {norm:.1e}, limited by rounding")
+            return _ended(state, Status.CONVERGED, f"norm {norm:.1e}, limited by rounding")
         if norm > self.divergence * max(1.0, state.norms[0]):
-            return _end(state, Status.DIVERGED, f"norm {norm:.1e} from {state.norms[0]:.1e}")
+            return _ended(state, Status.DIVERGED, f"norm {norm:.1e} from {state.norms[0]:.1e}")
         if state.iterations >= self.max_iterations:
-            return _end(state, Status.MAX_ITERATIONS, f"last norms {_tail(state.norms)}")
+            return _ended(state, Status.MAX_ITERATIONS, f"last norms {_last_norms(state.norms)}")
         return state
 
     def _stagnates(self, norms: tuple[float, ...]) -> bool:
         if len(norms) < 2:
             return False
-        before, now = norms[-2:]
-        return before <= now <= self.stagnation * self.tolerance
+        previous, latest = norms[-2:]
+        return previous <= latest <= self.stagnation * self.tolerance
 
     def _advance(
         self, problem: NonlinearProblem, state: NewtonState, dx: Array, K: SparseMatrix
@@ -291,26 +295,26 @@ class Newton:
         """Go along dx as far as the problem admits; shorter while the residual is refused."""
         fraction = min(problem.step_limit(state.x, dx), 1.0)  # in this order nan stays nan
         if not fraction > 0.0:
-            return _end(state, Status.DIVERGED, "no part of the Newton step is admissible")
-        best, best_norm, least = state.x, math.inf, math.inf
-        before = self._merit(problem, state.x, state.norms[-1])
+            return _ended(state, Status.DIVERGED, "no part of the Newton step is admissible")
+        best, best_norm, best_merit = state.x, math.inf, math.inf
+        initial_merit = self._merit(problem, state.x, state.norms[-1])
         for _ in range(self.halvings + 1):
             x = state.x + fraction * dx
             norm = norm_at(problem, x, K)
             merit = self._merit(problem, x, norm) if math.isfinite(norm) else math.inf
-            if merit < least:
-                best, best_norm, least = x, norm, merit
-            if math.isfinite(merit) and self._falls(merit, before, fraction):
+            if merit < best_merit:
+                best, best_norm, best_merit = x, norm, merit
+            if math.isfinite(merit) and self._decreases(merit, initial_merit, fraction):
                 break
             fraction *= 0.5
         if not math.isfinite(best_norm):
             message = f"the residual along the Newton step is not finite, down to {fraction:.1e}"
-            return _end(state, Status.NOT_FINITE, message + _where(problem, x))
+            return _ended(state, Status.NOT_FINITE, message + _not_finite_message(problem, x))
         state = replace(state, x=best, norms=(*state.norms, best_norm))
-        hardly_less = best_norm > _HARDLY_LESS * state.norms[-2]
+        hardly_less = best_norm > _SLOW_DECREASE * state.norms[-2]
         rounding = hardly_less and self._is_rounding(problem, best, K)
         if rounding or self._is_exact(problem, state, K):
-            return _end(state, Status.CONVERGED, f"norm {best_norm:.1e}, all of it rounding")
+            return _ended(state, Status.CONVERGED, f"norm {best_norm:.1e}, all of it rounding")
         return state
 
     def _is_rounding(self, problem: NonlinearProblem, x: Array, K: SparseMatrix) -> bool:
@@ -321,7 +325,11 @@ class Newton:
 
     def _is_exact(self, problem: NonlinearProblem, state: NewtonState, K: SparseMatrix) -> bool:
         """True if the last digits of x make all that is left of a residual near the tolerance."""
-        if not self.tolerance < state.norms[-1] <= min(_FEW, self.stagnation) * self.tolerance:
+        if (
+            not self.tolerance
+            < state.norms[-1]
+            <= min(_NEAR_TOLERANCE, self.stagnation) * self.tolerance
+        ):
             return False
         if not isinstance(problem, RoundedProblem):
             return False
@@ -334,8 +342,10 @@ class Newton:
             return problem.merit(x)
         return norm
 
-    def _falls(self, merit: float, before: float, fraction: float) -> bool:
-        return not self.line_search or merit <= (1.0 - _SUFFICIENT_DECREASE * fraction) * before
+    def _decreases(self, merit: float, initial_merit: float, fraction: float) -> bool:
+        return (
+            not self.line_search or merit <= (1.0 - _SUFFICIENT_DECREASE * fraction) * initial_merit
+        )
 
 
 def norm_at(problem: NonlinearProblem, x: Array, K: SparseMatrix | None = None) -> float:
@@ -348,22 +358,22 @@ def norm_at(problem: NonlinearProblem, x: Array, K: SparseMatrix | None = None) 
     return norm if math.isfinite(norm) else math.inf
 
 
-def _where(problem: NonlinearProblem, x: Array) -> str:
-    """Words for places where the equations are not finite at x."""
-    found = problem.where_not_finite(x) if isinstance(problem, NamedProblem) else ""
-    return f": {found}" if found else ""
+def _not_finite_message(problem: NonlinearProblem, x: Array) -> str:
+    """Message: where the equations are not finite at x."""
+    place_message = problem.where_not_finite(x) if isinstance(problem, NamedProblem) else ""
+    return f": {place_message}" if place_message else ""
 
 
-def _which(problem: NonlinearProblem, x: Array, error: SingularMatrix) -> str:
+def _singular_message(problem: NonlinearProblem, x: Array, error: SingularMatrix) -> str:
     """The unknown that no equation determines, or the element that spoils the matrix."""
     if error.row is not None and isinstance(problem, NamedProblem):
         return f": no equation determines {problem.name_of(error.row)}"
-    return _where(problem, x)
+    return _not_finite_message(problem, x)
 
 
-def _end(state: NewtonState, status: Status, message: str) -> NewtonState:
+def _ended(state: NewtonState, status: Status, message: str) -> NewtonState:
     return replace(state, status=status, message=message)
 
 
-def _tail(norms: tuple[float, ...]) -> str:
+def _last_norms(norms: tuple[float, ...]) -> str:
     return ", ".join(f"{norm:.1e}" for norm in norms[-4:])

@@ -26,16 +26,16 @@ _AT_REST = 1e-10  # of the largest entry of a vector
 
 
 @runtime_checkable
-class Judging(Protocol):
+class JudgesSingularity(Protocol):
     """Factors whose matrix is not at hand as a whole, and which say by themselves what is loose."""
 
-    def loosest(self) -> int | None:
+    def unconstrained_unknown(self) -> int | None:
         """The number of the unknown that moves most where the matrix is singular, else None."""
         ...
 
 
 @dataclass
-class Remembering:
+class LastFactorisation:
     """A linear solver that keeps the last matrix and its factors."""
 
     solver: LinearSolver
@@ -55,19 +55,19 @@ class Remembering:
 
 
 @dataclass
-class FirstStep:
+class SupportCheck:
     """Newton's method of a path whose first step that factorises is looked at once.
 
     memory: its linear solver, which keeps the last factors.
     """
 
     newton: Newton
-    memory: Remembering = field(init=False)
-    _looked: bool = False
+    memory: LastFactorisation = field(init=False)
+    _checked: bool = False
 
     def __post_init__(self) -> None:
         """Let the linear solver remember."""
-        self.memory = Remembering(self.newton.linear)
+        self.memory = LastFactorisation(self.newton.linear)
         self.newton = replace(self.newton, linear=self.memory)
 
     @property
@@ -78,17 +78,21 @@ class FirstStep:
     def check(self, problem: NamedProblem, solution: Solution) -> None:
         """Raise NotConverged if nothing held what was solved; ask after each converged step."""
         memory = self.memory.last
-        if memory is None or self._looked:
+        if memory is None or self._checked:
             return
-        self._looked = True
+        self._checked = True
         K, factors = memory
-        number = factors.loosest() if isinstance(factors, Judging) else loosest(K, factors)
+        number = (
+            factors.unconstrained_unknown()
+            if isinstance(factors, JudgesSingularity)
+            else unconstrained_unknown(K, factors)
+        )
         if number is not None:
             message = f"nothing prevents a motion of {problem.name_of(number)}"
             raise NotConverged(replace(solution, status=Status.NOT_HELD, message=message))
 
 
-def loosest(K: SparseMatrix, factors: Factors) -> int | None:
+def unconstrained_unknown(K: SparseMatrix, factors: Factors) -> int | None:
     """The unknown that moves most where K, (n, n), is singular but for rounding, else None.
 
     For K y = b, changes of the entries of K by max |b| / (|K| |y|), relative to each, make K
@@ -96,21 +100,21 @@ def loosest(K: SparseMatrix, factors: Factors) -> int | None:
     at rest.
     """
     try:
-        y = factors.solve(signs(K.shape[0]))
+        y = factors.solve(random_signs(K.shape[0]))
     except SingularMatrix:
         return None  # it was regular enough for the solution
-    y = moving(y, np.abs(y).max())
+    y = without_small_entries(y, np.abs(y).max())
     if np.all(np.abs(np.asarray(K @ y)) <= SINGULAR * np.asarray(abs(K) @ np.abs(y))):
         return int(np.abs(y).argmax())
     return None
 
 
-def signs(n: int, seed: int = 0) -> Array:
+def random_signs(n: int, seed: int = 0) -> Array:
     """Random entries -1 and 1, (n,)."""
-    found: Array = np.where(np.random.default_rng(seed).random(n) < 0.5, -1.0, 1.0)
-    return found
+    entries: Array = np.where(np.random.default_rng(seed).random(n) < 0.5, -1.0, 1.0)
+    return entries
 
 
-def moving(y: Array, largest: float) -> Array:
+def without_small_entries(y: Array, largest: float) -> Array:
     """Entries (n,) with those at rest set to 0; largest: magnitude of any."""
     return np.where(np.abs(y) <= _AT_REST * largest, 0.0, y)

@@ -230,9 +230,9 @@ class Branch:
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        ends = " to ".join(f"{t:.6g}" for t in (*self.parameters[:1], *self.parameters[-1:]))
+        bounds = " to ".join(f"{t:.6g}" for t in (*self.parameters[:1], *self.parameters[-1:]))
         return (
-            f"<Branch: {len(self.points)} points, {ends or 'none'}; {self.status.value}; "
+            f"<Branch: {len(self.points)} points, {bounds or 'none'}; {self.status.value}; "
             f"{len(self.failures)} failures, {len(self.limit_points)} limit points>"
         )
 

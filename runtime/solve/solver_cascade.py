@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.newton import Corrector, Informed, norm_at
+from softehl.runtime.solve.newton import Corrector, WarmStartable, norm_at
 from softehl.runtime.solve.solution import Solution
 
 
@@ -50,27 +50,29 @@ class Ladder:
         Solution
             With the number of the solver as `rung`, and iterations of all of them.
         """
-        start, factorisations, iterations, words = x0, 0, 0, list[str]()
+        start, factorisations, iterations, messages = x0, 0, 0, list[str]()
         for number, corrector in enumerate(self.rungs):
-            found = replace(corrector.solve(problem, start), rung=number)
-            factorisations += found.factorisations
-            iterations += found.iterations
-            if found.converged:
+            solution = replace(corrector.solve(problem, start), rung=number)
+            factorisations += solution.factorisations
+            iterations += solution.iterations
+            if solution.converged:
                 break
-            words.append(found.message)
-            start = _warmer(problem, found, start)
-        message = found.message if found.converged else "; then: ".join(words)
-        if found.converged:
-            self._tell(problem, found.x, found.rung)
-        return replace(found, message=message, factorisations=factorisations, iterations=iterations)
+            messages.append(solution.message)
+            start = _next_start(problem, solution, start)
+        message = solution.message if solution.converged else "; then: ".join(messages)
+        if solution.converged:
+            self._warm_start_others(problem, solution.x, solution.rung)
+        return replace(
+            solution, message=message, factorisations=factorisations, iterations=iterations
+        )
 
-    def _tell(self, problem: Any, x: Array, finder: int) -> None:
+    def _warm_start_others(self, problem: Any, x: Array, finder: int) -> None:
         for number, corrector in enumerate(self.rungs):
-            if number != finder and isinstance(corrector, Informed):
-                corrector.take_up(problem, x)
+            if number != finder and isinstance(corrector, WarmStartable):
+                corrector.warm_start(problem, x)
 
 
-def _warmer(problem: Any, failed: Solution, start: Array) -> Array:
+def _next_start(problem: Any, failed: Solution, start: Array) -> Array:
     """The iterate from which the next corrector begins, (n,)."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         nearer = norm_at(problem, failed.nearest) < norm_at(problem, start)

@@ -46,7 +46,7 @@ class Noted:
         self.starts.append(float(x0[0]))
         return self.newton.solve(problem, x0)
 
-    def take_up(self, problem: Any, x: Array) -> None:
+    def warm_start(self, problem: Any, x: Array) -> None:
         self.told.append(float(x[0]))
 
 

@@ -12,11 +12,11 @@ import pytest
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
+from softehl.runtime.solve.pseudo_transient import PseudoTransient, TransientState
 from softehl.runtime.solve.solution import Branch, Status
 from tests.runtime.test_newton import Algebraic
 
-START = Moment(np.array([-5.0]), 1e-3)
+START = TransientState(np.array([-5.0]), 1e-3)
 
 
 @dataclass
@@ -43,7 +43,7 @@ class Decay:
         return float(np.abs(after - before).max()) if size is None else size
 
 
-def followed(problem: Decay, **rule: int | tuple[int, int]) -> tuple[Branch, Moment]:
+def followed(problem: Decay, **rule: int | tuple[int, int]) -> tuple[Branch, TransientState]:
     return PseudoTransient(Newton(max_iterations=30), **rule).follow(problem, START)  # type: ignore[arg-type]
 
 
@@ -60,7 +60,7 @@ def test_it_ends_at_the_steady_state_after_long_steps() -> None:
 
 def test_a_step_that_changes_much_is_followed_by_a_shorter_one() -> None:
     problem = Decay(size=lambda number: (0.07, 1.05, 0.7)[(number - 1) % 3])
-    followed(problem, most=4)
+    followed(problem, max_steps=4)
     ratios = [b / a for (a, _), (b, _) in pairwise(problem.asked)]
     assert ratios == pytest.approx([10.0, 0.7 / 1.05, 1.0])
 
@@ -108,7 +108,7 @@ def test_a_corrector_that_fails_is_a_failure_too() -> None:
 
 def test_what_does_not_become_steady_ends_after_its_steps() -> None:
     problem = Decay(size=lambda number: 0.7)
-    branch, _ = followed(problem, most=5)
+    branch, _ = followed(problem, max_steps=5)
     assert branch.status is Status.MAX_ITERATIONS
     assert branch.message.startswith("not steady after 5 steps")
     assert len(problem.asked) == 5
@@ -117,7 +117,7 @@ def test_what_does_not_become_steady_ends_after_its_steps() -> None:
 def test_a_path_goes_on_from_the_moment_that_was_reached() -> None:
     whole, first, rest = Decay(), Decay(), Decay()
     followed(whole)
-    rule = PseudoTransient(Newton(max_iterations=30), most=4)
+    rule = PseudoTransient(Newton(max_iterations=30), max_steps=4)
     _, moment = rule.follow(first, START)
     branch, reached = PseudoTransient(Newton(max_iterations=30)).follow(rest, moment)
     assert branch.converged

@@ -88,8 +88,8 @@ class SchurCorrector:
             tangent.outdated = rate > self.stale
         return solution
 
-    def take_up(self, problem: LayeredProblem, x: Array) -> None:
-        """Go on from a solution (n,) that another corrector found; see `Informed`."""
+    def warm_start(self, problem: LayeredProblem, x: Array) -> None:
+        """Go on from a solution (n,) that another corrector found; see `WarmStartable`."""
         self.tangent.accepted, self.tangent.outdated = problem.admissible(x), True
 
     def _iterate(self, problem: LayeredProblem, x0: Array, accepted: Array) -> Solution:

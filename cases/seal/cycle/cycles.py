@@ -94,7 +94,7 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
 
 def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) -> Branch | None:
     """All cycles; the one that did not come to its end, if there is one."""
-    before, done, last = march.begin(x), 0, None
+    before, done, last = march.start_parameter(x), 0, None
     while (kept := observer.kept(float(done + 1))) is not None:
         last, (loop, _, state, _) = kept
         before, done = repeated(march, loop)[-1], done + 1

@@ -51,7 +51,7 @@ def repeated(march: March, loop: Mapping[str, Array]) -> list[Reading]:
     rows = zip(*(loop[name].tolist() for name in names), strict=True)
     past = [Reading(*row) for row in rows]
     for reading in past:
-        march.leave(reading)
+        march.initial_direction(reading)
     return past
 
 

@@ -24,13 +24,13 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.continuation import (
     End,
-    Record,
+    PathLog,
+    StepAttempt,
+    Stepper,
     StepRule,
-    Trial,
-    Way,
-    followed,
+    follow_path,
     next_parameter,
-    through,
+    polynomial_value,
 )
 from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.solution import Branch, Status
@@ -75,16 +75,16 @@ class Reading:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Step(Trial):
+class _Step(StepAttempt):
     """A step that may be accepted, with the problem and the loads at its end."""
 
-    following: float
+    next_step: float
     problem: Problem
     film: FilmLoads
 
 
 @dataclass(eq=False)
-class March(Way):
+class March(Stepper):
     """A march in time; `behind` holds the last instants, newest first, and changes with steps.
 
     film: loads that do not change. tolerance: error of the film thickness, relative to it, that a
@@ -108,7 +108,7 @@ class March(Way):
     goal: float = 0.0
     told: Callable[[Instant, Reading], None] = lambda instant, reading: None
 
-    def begin(self, x: Array) -> Reading:
+    def start_parameter(self, x: Array) -> Reading:
         """From the steady film x (n,) at t = 0; its reading."""
         self.dt = 1e-3 * self.motion.period
         film = self._loads(0.0)
@@ -121,14 +121,14 @@ class March(Way):
         """March to a time; every step is told."""
         self.goal, self.told = goal, on_step
         smallest = 1e-8 * self.motion.period
-        return followed(self, StepRule(max(self.dt, smallest), smallest), Record("t"))
+        return follow_path(self, StepRule(max(self.dt, smallest), smallest), PathLog("t"))
 
     def left(self, reading: Reading) -> float | None:
         """Film (mm) that an outstroke leaves on the rod, None at instroke."""
         U = reading.rod_speed_mm_s
         return 2.0 * reading.flux_air_mm2_s / U if U > 0.0 else None
 
-    def leave(self, reading: Reading) -> None:
+    def initial_direction(self, reading: Reading) -> None:
         """Put what an outstroke leaves on the rod."""
         left = self.left(reading)
         if left is not None:
@@ -142,11 +142,11 @@ class March(Way):
 
     # --- inside -----------------------------------------------------------------------------------
 
-    def start(self) -> Trial:
-        """See `Way`."""
-        return Trial.known(self.behind[0].t, self.behind[0].x, self.dt)
+    def start(self) -> StepAttempt:
+        """See `Stepper`."""
+        return StepAttempt.solved(self.behind[0].t, self.behind[0].x, self.dt)
 
-    def attempt(self, step: float) -> Trial:
+    def attempt(self, step: float) -> StepAttempt:
         """Solve for the film a step later, or where the speed has a corner, or at the goal.
 
         Steps are at most 0.02 of a period: longer ones changed the work of a cycle by one per cent.
@@ -157,7 +157,7 @@ class March(Way):
         corner = self.motion.speed.next_corner(now) if self.motion.corners else self.goal
         longest = min(step, 0.02 * self.motion.period)
         t = next_parameter(now, min(corner, self.goal), longest)
-        guess = through([i.t for i in self.behind], [i.x for i in self.behind], t)
+        guess = polynomial_value([i.t for i in self.behind], [i.x for i in self.behind], t)
         dt, film = t - now, self._loads(t)
         problem, layer = self._problem(film, dt)
         tangent = self.corrector.tangent.state
@@ -166,27 +166,27 @@ class March(Way):
         if self.corrector.tangent.state is not tangent:
             self.condensed_at = t
         if not solution.converged:
-            return Trial(t, solution, dt)
+            return StepAttempt(t, solution, dt)
         error = self._error(solution.x, guess)
         power = 1.0 / 3.0 if len(self.behind) > 1 else 0.5
         following = 0.8 * dt / max(error**power, 0.45)
         if error > 3.0:
             words = f"its error is {error:.2g} tolerances"
             solution = replace(solution, status=Status.REFUSED, message=words)
-        return _Step(t, solution, dt, following=following, problem=problem, film=film)
+        return _Step(t, solution, dt, next_step=following, problem=problem, film=film)
 
-    def accept(self, trial: Trial) -> None:
-        """See `Way`."""
-        if not isinstance(trial, _Step):
+    def accept(self, attempt: StepAttempt) -> None:
+        """See `Stepper`."""
+        if not isinstance(attempt, _Step):
             return  # the start
-        instant = self._instant(trial.problem, trial.solution.x, trial.taken)
-        reading = self._reading(trial.problem, trial.film, instant, trial.solution.iterations)
-        self.behind, self.dt = [instant, *self.behind[:2]], trial.following
-        self.leave(reading)
+        instant = self._instant(attempt.problem, attempt.solution.x, attempt.step_length)
+        reading = self._reading(attempt.problem, attempt.film, instant, attempt.solution.iterations)
+        self.behind, self.dt = [instant, *self.behind[:2]], attempt.next_step
+        self.initial_direction(reading)
         self.told(instant, reading)
 
     def end(self) -> End | None:
-        """See `Way`."""
+        """See `Stepper`."""
         now = self.behind[0].t
         going = now < self.goal * (1.0 - 1e-12)
         return None if going else (Status.CONVERGED, f"reached t = {now:.9g}")

@@ -23,7 +23,7 @@ from softehl.runtime.discretisation.mass import lumped, mass_matrices
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
+from softehl.runtime.solve.pseudo_transient import PseudoTransient, TransientState
 from softehl.runtime.solve.solution import Solution
 
 FIRST, LAST = 1e-4, 1e3
@@ -80,7 +80,7 @@ class CreepCorrector:
         steps = PseudoTransient(PressureNewton(settings, self.system), last=LAST)
         branch, _ = steps.follow(
             Creeping(self.system),
-            Moment(x0, FIRST, 1.0),
+            TransientState(x0, FIRST, 1.0),
             finish=lambda x: PressureNewton(self.newton, self.system).solve(problem, x),
         )
         made, spent = branch.factorisations, branch.iterations

@@ -70,8 +70,8 @@ class PressureNewton:
             self.pressures = self.system.element_pressures(solution.x)
         return solution
 
-    def take_up(self, problem: Problem | Layered | Anchored, x: Array) -> None:
-        """Go on from a solution (n,) that another corrector found; see `Informed`."""
+    def warm_start(self, problem: Problem | Layered | Anchored, x: Array) -> None:
+        """Go on from a solution (n,) that another corrector found; see `WarmStartable`."""
         self.pressures = None  # of the start of the next solve
 
 

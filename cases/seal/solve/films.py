@@ -28,7 +28,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.newton import NonlinearProblem
-from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
+from softehl.runtime.solve.pseudo_transient import PseudoTransient, TransientState
 from softehl.runtime.solve.solution import Point, Solution, Status
 
 _LEAST = 0.06
@@ -63,9 +63,9 @@ class Film:
         return self.squeeze_film.film
 
     @property
-    def begun(self) -> tuple[SqueezeFilm, Moment]:
+    def begun(self) -> tuple[SqueezeFilm, TransientState]:
         """The moment from which it is squeezed out where it is not found at once."""
-        return self.squeeze_film, Moment(self.x, FIRST, 1.0)
+        return self.squeeze_film, TransientState(self.x, FIRST, 1.0)
 
     @cached_property
     def problem(self) -> Problem:
@@ -89,7 +89,7 @@ class NoFilm:
     speed: float
     status: Status
     message: str
-    begun: tuple[SqueezeFilm, Moment] | None = None
+    begun: tuple[SqueezeFilm, TransientState] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ class FilmSolver:
         squeeze_film = SqueezeFilm(self.system, layer, film, scales, x, moment)
         pressed = pressed_film(self.system, x, film.sealed_pressure)
         correctors = FilmCorrectors.of(self.system, self.driver.newton)
-        return self._followed(squeeze_film, Moment(pressed, squeeze_film.first), correctors)
+        return self._followed(squeeze_film, TransientState(pressed, squeeze_film.first), correctors)
 
     def from_neighbour(self, last: Sequence[Film], speed: float) -> Film | NoFilm:
         """The film at |U|, mm/s, along those at speeds between, from the last film on our mesh.
@@ -148,9 +148,11 @@ class FilmSolver:
         branch = path.follow(problem_at, start, stop, film.x, on_point=tell, previous=previous)
         log.end(branch)
         x = branch.last.x if branch.points else film.x
-        return self._reached(squeeze_film, branch.end, Moment(x, FIRST, 1.0), correctors)
+        return self._reached(squeeze_film, branch.end, TransientState(x, FIRST, 1.0), correctors)
 
-    def from_film(self, carried: SqueezeFilm, start: Moment, pressures: Array) -> Film | NoFilm:
+    def from_film(
+        self, carried: SqueezeFilm, start: TransientState, pressures: Array
+    ) -> Film | NoFilm:
         """The steady film of another mesh, carried to ours: at once, else squeezed out from there.
 
         pressures: (Q,) of the elements.
@@ -166,7 +168,7 @@ class FilmSolver:
         self,
         squeeze_film: SqueezeFilm,
         found: Solution,
-        start: Moment,
+        start: TransientState,
         correctors: FilmCorrectors,
         pressures: Array | None = None,
     ) -> Film | NoFilm:
@@ -178,7 +180,7 @@ class FilmSolver:
     def _followed(
         self,
         squeeze_film: SqueezeFilm,
-        start: Moment,
+        start: TransientState,
         correctors: FilmCorrectors,
         pressures: Array | None = None,
     ) -> Film | NoFilm:

@@ -258,8 +258,8 @@ class Preconditioned:
             x, info = getattr(krylov, method)(self.matrix, b, **given)
         return x, len(norms), info < 0
 
-    def loosest(self) -> None:
-        """See `Judging`: iterations that converged show that the matrix is regular."""
+    def unconstrained_unknown(self) -> None:
+        """See `JudgesSingularity`: iterations that converged show that the matrix is regular."""
 
     def indefinite(self) -> bool | None:
         """True where the matrix has a negative eigenvalue; None where it is not symmetric.
@@ -327,7 +327,7 @@ class _Either:
             self.factors = second.factorise(self.K)
             return self.factors.solve(b)
 
-    def loosest(self) -> None:
+    def unconstrained_unknown(self) -> None:
         """See `Preconditioned`."""
 
     def indefinite(self) -> bool | None:

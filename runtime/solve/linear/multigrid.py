@@ -54,12 +54,12 @@ class Level:
         rho, scaled = half / centre, np.empty_like(r)
         for _ in range(DEGREE - 1):
             r -= self.apply(step)
-            following = 1.0 / (2.0 * centre / half - rho)
+            next_rho = 1.0 / (2.0 * centre / half - rho)
             np.multiply(self.inverse, r, out=scaled)
-            scaled *= 2.0 * following / half
-            step *= following * rho
+            scaled *= 2.0 * next_rho / half
+            step *= next_rho * rho
             step += scaled
-            rho = following
+            rho = next_rho
             x += step
         return x
 

@@ -19,7 +19,7 @@ from softehl.runtime.solve.linear.linear_solver import (
     SingularMatrix,
     SparseMatrix,
 )
-from softehl.runtime.solve.singularity_check import Judging, loosest
+from softehl.runtime.solve.singularity_check import JudgesSingularity, unconstrained_unknown
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,14 +107,18 @@ class Eliminated:
         known = getattr(self.rest, "indefinite", None)
         return None if known is None else known()
 
-    def loosest(self) -> int | None:
-        """See `Judging`: what K_II admits is regular, so the rest decides."""
-        number = self.rest.loosest() if isinstance(self.rest, Judging) else self._loose()
+    def unconstrained_unknown(self) -> int | None:
+        """See `JudgesSingularity`: what K_II admits is regular, so the rest decides."""
+        number = (
+            self.rest.unconstrained_unknown()
+            if isinstance(self.rest, JudgesSingularity)
+            else self._loose()
+        )
         return None if number is None else int(self.external[number])
 
     def _loose(self) -> int | None:
         matrix = getattr(self.rest, "matrix", None)
-        return None if matrix is None else loosest(matrix, self.rest)
+        return None if matrix is None else unconstrained_unknown(matrix, self.rest)
 
 
 def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, float]:
