@@ -88,7 +88,7 @@ if TYPE_CHECKING:
     from softehl.runtime.solve.solver_cascade import Ladder
     from softehl.runtime.study import Study
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 if not (Path(__file__).parent / "runtime").is_dir():
     __path__.append(str(Path(__file__).resolve().parents[2]))  # a checkout without symbolic links

@@ -9,6 +9,8 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import softehl
+
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 OPTIONAL = {
@@ -67,3 +69,14 @@ def test_there_is_an_extra_for_each_purpose() -> None:
     wanted = {"amg", "benchmarks", "cad", "cluster", "dev", "docs", "fast", "generate", "mpi"}
     wanted |= {"app", "hosts", "report"}
     assert set(PROJECT["optional-dependencies"]) == wanted
+
+
+def test_the_version_is_that_of_the_changelog_and_the_citation() -> None:
+    changes = re.findall(
+        r"^## \[([\d.]+)\] - (\S+)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE
+    )
+    cited = dict(
+        re.findall(r"^([\w-]+): (\S+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    )
+    assert changes[0] == (softehl.__version__, cited["date-released"])
+    assert cited["version"] == softehl.__version__

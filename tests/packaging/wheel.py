@@ -27,8 +27,10 @@ REPRODUCE = ("reproduce", "table1")
 RUN = ("run", "oring", "--quiet")
 GENERATE = ("generate", "my_model.py")
 KERNELS = ("kernels",)
-CARRIED = ("tests/packaging/wheel.py", "benchmarks", "docs/conf.py", "CHANGELOG.md")
-CARRIED += ("CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile")
+CARRIED = (
+    *("tests/packaging/wheel.py", "benchmarks", "docs/conf.py", "CHANGELOG.md"),
+    *("CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile"),
+)
 """Beside the packages, of which wheels are built from the sdist here."""
 
 
