@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from benchmarks import casadi_route, compiling, counting, ffcx_route, kernels, softehl_route
+from benchmarks import casadi_route, compiling, counting, ffcx_route, softehl_route
 from benchmarks.candidate import ENTRY, Candidate, Layout
-from benchmarks.deriving import DerivationError, TimeLimitError, derive, run_limited
+from benchmarks.deriving import TimeLimitError, run_limited
 from benchmarks.measure import Settings, build, measure
 from benchmarks.problem import TOLERANCE, Case, Result, deviation, elements, reference
 from benchmarks.routes import GENERATORS, Generator
@@ -123,17 +122,6 @@ def test_time_limits_are_named_outcomes(tmp_path: Path) -> None:
     assert built.operations is None
 
 
-def test_a_generator_that_fails_says_why(tmp_path: Path) -> None:
-    with pytest.raises(DerivationError, match="nothing"):
-        derive("benchmarks.casadi_route", Case.Q4_A, "nothing", tmp_path / "x.pickle", 60.0)
-
-
-def test_who_cannot_do_fbar_says_so() -> None:
-    for generator in GENERATORS:
-        assert set(generator.of(Case.Q4_B, every=False)) < set(generator.of(Case.Q4_B, every=True))
-        assert bool(generator.of(Case.FBAR_B, every=False)) != bool(generator.fbar)
-
-
 @pytest.mark.parametrize("generator", GENERATORS[1:], ids=lambda g: g.title)
 def test_a_peer_computes_the_same(generator: Generator, tmp_path: Path) -> None:
     pytest.importorskip(generator.package)
@@ -143,12 +131,6 @@ def test_a_peer_computes_the_same(generator: Generator, tmp_path: Path) -> None:
             candidate = module.derive(case, route)
             (built,) = build(candidate, tmp_path / case.name, settings(), None)
             assert built.common.outcome == ""
-
-
-def test_the_command_line_refuses_what_it_does_not_know() -> None:
-    result = CliRunner().invoke(kernels.main, ["--case", "q8_b"])
-    assert result.exit_code == 2
-    assert "q4_b" in result.output
 
 
 def test_fast_math_leaves_subnormal_numbers_to_the_process(tmp_path: Path) -> None:

@@ -61,14 +61,3 @@ def test_the_difference_and_the_exponent() -> None:
     assert lines[-1].startswith("monolithic:b, p_s = 1, stroke out: ")
     assert growth([(10, 5.0), (10, 6.0)]) is None
     assert growth([(400, 8.0), (100, 1.0)]) == pytest.approx(1.5)
-
-
-def test_what_has_not_converged_has_a_line_and_no_exponent() -> None:
-    lost = run("auto:a", 8, converged=False, films={"-1600": 2.0, "-50": 0.2})
-    nothing = run("monolithic:b", 8, converged=False, films={}, stages=[stage("squeeze", 30, 1.0)])
-    text = summary([run("auto:a", 4), lost, nothing])
-    assert "| NOT CONVERGED: 2 speeds, down to 50 mm/s |" in text
-    assert "| NOT CONVERGED: no film |" in text
-    assert "no film in common" in text
-    assert text.splitlines()[-2].endswith("not converged at density 8: no exponent")
-    assert "power" not in text

@@ -61,26 +61,6 @@ def test_whether_a_seal_leaks_and_what_friction_it_has(
     assert not isinstance(line, Alarm)
 
 
-def test_one_stroke_that_was_asked_for_is_no_failure() -> None:
-    for sign, stroke in ((1.0, "out"), (-1.0, "in")):
-        rows = [row(sign * 400.0, 1.4), row(sign * 100.0, 0.5)]
-        first, *lines = oring.CASE.answer(Seal(stroke=stroke), rows)  # type: ignore[arg-type]
-        assert first == f'{stroke}stroke alone, as asked for; leakage needs stroke = "both"'
-        assert lines[0].startswith(f"  400 mm/s: friction 3 N {stroke}")
-        assert not any("leakage" in line for line in lines)
-    assert "leaks" in answer([row(400.0, 1.4), row(-400.0, 1.1)], 100.0, "out")[0]
-
-
-def test_several_speeds_have_one_line_that_says_where_it_leaks_most() -> None:
-    rows = [row(400.0, 1.4), row(-400.0, 1.1), row(100.0, 0.5), row(-100.0, 0.6)]
-    assert answer(rows, 50.0)[0] == (
-        "leaks, most at 400 mm/s: 1.18 mm3 in a cycle of 50 mm out and back; not at 1 of 2"
-    )
-    assert answer([], 50.0) == []
-    more = [*rows, row(400.0, 2.4, sealed_pressure=2.0), row(-400.0, 1.1, sealed_pressure=2.0)]
-    assert answer(more, 50.0)[0].startswith("leaks, most at 2 MPa and 400 mm/s: 5.11 mm3")
-
-
 def test_films_thinner_than_roughness_are_an_alarm() -> None:
     back = replace(row(-400.0, 1.1), lambda_ratio=0.7, regime="boundary")
     out = replace(row(400.0, 1.4), lambda_ratio=3.5, regime="full")
@@ -165,28 +145,6 @@ def test_breaking_away_is_friction_of_a_slow_rod() -> None:
     found = cycle.cycle_row(1, 25.0, films, readings[0], None)
     assert found.breakaway_N == 9.0
     assert found.lambda_ratio == 2.0
-
-
-def test_a_report_is_titled_by_its_seal() -> None:
-    titles = [
-        oring.CASE.titled(Seal()),
-        oring.CASE.titled(Seal(section="x_ring", groove_width=4.3)),
-        cycle.CASE.titled(cycle.Cycle(section="u_cup", groove_width=6.0)),
-    ]
-    for title, name in zip(titles, ("O-ring", "X-ring", "U-cup"), strict=True):
-        seal = f"{name} 50.39 \N{MULTIPLICATION SIGN} 3.53 mm"
-        assert title.startswith(f"reciprocating {seal}, a rod seal")
-
-
-def test_a_title_of_several_seals_says_once_what_is_shown() -> None:
-    names = ("NBR 70", "PU 95", "NBR 70")
-    runs = [
-        FinishedRun(Path(n), oring.CASE, Seal.model_validate({"material": n}), [], content={})
-        for n in names
-    ]
-    head = render(runs, []).split("<h1>")[1].split("</h1>")[0]
-    assert head.startswith("Reciprocating O-ring")
-    assert [head.count(words) for words in ("NBR 70", "PU 95", "film thickness")] == [1, 1, 1]
 
 
 def test_tolerances_of_a_cup_are_those_of_its_rod() -> None:

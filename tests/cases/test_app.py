@@ -5,9 +5,7 @@ from __future__ import annotations
 import sys
 import time
 import tomllib
-from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -15,13 +13,8 @@ from softehl.__main__ import main
 from softehl.cases.app.choices import CHOICES, rods, slides_on
 from softehl.cases.app.runs import Desk, case_text
 from softehl.cases.harness.case_file import read_case
-from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.report.part import FinishedRun
-from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.states.state import UNCERTAIN
 from softehl.cases.shipped import SHIPPED
-from tests.cases.test_leakage import row
 
 GIVEN = {
     **{"ring": "36x4", "rod": "36 f7", "compound": "NBR 70", "density": 1},
@@ -54,10 +47,6 @@ def test_all_that_is_offered_is_understood() -> None:
             key, rod = slides_on(given.pop("rod"))
             p = Seal.model_validate({**given, key: rod})
             assert p.piston == (key == "bore"), option
-
-
-def test_a_ring_that_is_not_understood_has_no_rods() -> None:
-    assert rods("a ring") == rods("AS568-999") == []
 
 
 def test_a_case_file_says_what_was_given(tmp_path: Path) -> None:
@@ -109,64 +98,3 @@ def test_without_panel_one_line_says_what_to_install(
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert "pip install 'softehl[app]'" in error
-
-
-def test_a_state_that_is_not_ok_has_its_reason_beside_the_answer(tmp_path: Path) -> None:
-    for module in ("panel", "panel_material_ui"):
-        pytest.importorskip(module)
-    from softehl.cases.app.page import _lines
-
-    rows = [row(400.0, 1.4), row(-400.0, 1.1, UNCERTAIN)]
-    lines = _lines(FinishedRun(tmp_path, CASE, Seal(), rows))
-    assert any("(in uncertain)" in line for line in lines)
-    assert any(line.startswith("uncertain: ") and "U = -400 mm/s" in line for line in lines)
-
-
-@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of Panel
-def test_a_field_keeps_what_is_typed_after_a_text_that_was_refused() -> None:
-    form = _form_on_a_page()
-    pressure = form.widgets["sealed_pressure"]
-    pressure.value = "5 bra"  # entered
-    shown = []
-    pressure.param.watch(lambda event: shown.append(event.new), ["value", "value_input"])
-    _type(form, "sealed_pressure", "20 bar")
-    assert all(shown), shown  # a browser that hears of an empty field in between leaves it empty
-    assert (pressure.value, pressure.value_input) == ("20 bar", "20 bar")
-    assert form.values()["sealed_pressure"] == "20 bar"
-
-
-@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of Panel
-def test_the_rod_follows_a_ring_that_is_only_typed() -> None:
-    form = _form_on_a_page()
-    _type(form, "ring", "ISO 3601 20x2.65")
-    rod = form.widgets["rod"]
-    assert (rod.value, rod.value_input) == ("20 f7", "20 f7")
-
-
-def _form_on_a_page() -> Any:
-    """A form whose widgets have models, as in a browser, and that takes over what it can read."""
-    for module in ("panel", "panel_material_ui"):
-        pytest.importorskip(module)
-    from softehl.cases.app.form import Form
-
-    form = Form()
-    for widget in form.widgets.values():
-        widget.get_root()
-
-    def look(_: object) -> None:
-        with suppress(BadInput):
-            form.run()
-            form.settle()
-
-    form.watch(look)
-    return form
-
-
-def _type(form: Any, key: str, text: str) -> None:
-    """Type into a field letter by letter, without Enter."""
-    from panel.util import edit_readonly
-
-    widget = form.widgets[key]
-    for end in range(1, len(text) + 1):
-        with edit_readonly(widget):
-            widget.value_input = text[:end]

@@ -50,11 +50,6 @@ def test_what_is_given_is_not_assumed(given: str, gone: str) -> None:
     assert gone not in str(assumed(*RING, given, *more))
 
 
-def test_another_section_has_its_proportions() -> None:
-    assert "the usual proportions of section x_ring" in assumed("section=x_ring")
-    assert "proportions" not in str(assumed("section=x_ring", "lobe_radius=0.9"))
-
-
 WATER_GLYCOL = ("oil=46 cSt at 40 degC, 12 cSt at 100 degC", "temperature=40")
 
 
@@ -85,27 +80,3 @@ def test_rubber_and_oil_in_the_cold_are_not_what_they_are_taken_for() -> None:
     assert "may be as high as -30 degC" in warned("oil=HVLP 32", "temperature=-35")
     assert "below both viscosities" in warned(WATER_GLYCOL[0], "temperature=-10")
     assert not warned("material=NBR 70", "oil=HLP 32", "temperature=20")
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        (("pressure_viscosity=2e-8",), "oils have 0.01 to 0.04"),
-        (("pressure_viscosity=0.5",), "oils have 0.01 to 0.04"),
-        (("material=EPDM 70", "oil=HLP 46 at 50 degC"), "EPDM swells in mineral oil"),
-        (("speeds=1e6",), "reciprocating seals are used to 15000 mm/s"),
-    ],
-)
-def test_what_no_seal_has_is_told(given: tuple[str, ...], words: str) -> None:
-    assert words in warned(*RING, *given)
-    assert words not in warned(*RING)
-
-
-def test_a_modulus_that_was_not_given_is_said() -> None:
-    assert "mu_2 = 0.62 MPa" in assumed(*RING, "mu_1=2")
-    assert "mu_" not in str(assumed(*RING, "mu_1=2", "mu_2=0"))
-    assert "mu_" not in str(assumed(*RING, "material=NBR 70"))
-
-
-def test_a_slider_assumes_nothing() -> None:
-    assert assumed(case="slider") == []

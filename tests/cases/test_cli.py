@@ -18,19 +18,16 @@ import pytest
 import softehl
 from softehl.cases import oring
 from softehl.cases.harness import observer as harness
-from softehl.cases.harness.earlier import advice_of, kernel_signatures
+from softehl.cases.harness.earlier import kernel_signatures
 from softehl.cases.harness.record import RunRecord
-from softehl.cases.harness.report.page import read_finished
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.session import NOT_CONVERGED
 from softehl.cases.oring import PICTURES, ORingCase
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report import pictures
-from softehl.cases.seal.solve.method import run as solve_really
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.state import (
     COLLAPSED,
-    UNCERTAIN,
     ContactState,
     FilmState,
     Observer,
@@ -40,12 +37,12 @@ from softehl.cases.seal.states.state import (
     StageRecord,
     place,
 )
-from softehl.cases.shipped import SHIPPED
 from softehl.runtime.kernels.kernel import MissingKernelsError
 from softehl.runtime.kernels.shared_library import library_of
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.solution import Status
 from tests.cases.oring_cases import film_values
+from tests.cases.test_refused import REFUSED
 
 HEADER = (
     "sealed_pressure_MPa,rod_speed_mm_s,h_star_um,h_star_error_percent,h_min_um,p_max_MPa,"
@@ -58,7 +55,6 @@ HEADER = (
 )
 FAST = ("--set", "speeds=[400, 100]")
 PLOTS = {f"{name}.png" for name in PICTURES}
-SVG = {f"{name}.svg" for name in PICTURES}
 FILES = {
     *("run.json", "curve.csv", "leakage.csv"),
     *("contact_1.csv", "contact_1.vtu"),
@@ -175,22 +171,6 @@ def solve_and_collapse(parameters: Seal, observer: Observer) -> Outcome:
     return outcome(*states)
 
 
-def solve_unsealed(parameters: Seal, observer: Observer) -> Outcome:
-    """States that are uncertain for a reason of their own."""
-    states = []
-    for speed in parameters.speeds:
-        state = replace(film_state(parameters, speed, UNCERTAIN), advice="It ends at its crown.")
-        observer.film_state(state)
-        states.append(state)
-    return outcome(*states)
-
-
-def solve_and_forget(parameters: Seal, observer: Observer) -> Outcome:
-    """Claims convergence without having reached everything."""
-    observer.film_state(film_state(parameters, max(parameters.speeds)))
-    return outcome()
-
-
 def solve_and_break(parameters: Seal, observer: Observer) -> Outcome:
     """One state, then an error in the program."""
     observer.stage("speed", sealed_pressure=1.0, stroke="out", steps=None)
@@ -202,14 +182,6 @@ def solve_and_break(parameters: Seal, observer: Observer) -> Outcome:
 def solve_and_die(parameters: Seal, observer: Observer) -> Outcome:
     """One state, then the end of the process without any clean-up."""
     observer.film_state(film_state(parameters, max(parameters.speeds)))
-    os._exit(9)
-
-
-def solve_instroke_dies(parameters: Seal, observer: Observer) -> Outcome:
-    """Outstroke as it should be, instroke killed after its first state."""
-    if parameters.stroke == "out":
-        return solve(parameters, observer)
-    observer.film_state(film_state(parameters, -max(parameters.speeds)))
     os._exit(9)
 
 
@@ -271,62 +243,7 @@ def names(folder: Path) -> set[str]:
 
 # --- bad input ---------------------------------------------------------------------------------
 
-BAD = {
-    "unknown key": (["oring", "--set", "densty=4"], "did you mean 'density'"),
-    "no such key": (["oring", "--set", "xyzzy=1"], "'xyzzy'; allowed: what `softehl keys` lists"),
-    "study": (["many.toml"], "many.toml is a study of many runs: softehl sweep many.toml"),
-    "half a key": (["oring", "--set", "corner=0.1"], "'corner_radius' or 'corner_fillet'"),
-    "wrong type": (["oring", "--set", "sealed_pressure=high"], 'sealed_pressure = "high"'),
-    "negative pressure": (["oring", "--set", "sealed_pressure=-1"], "sealed_pressure = -1"),
-    "nan pressure": (["oring", "--set", "sealed_pressure=nan"], "sealed_pressure = NaN"),
-    "no tolerance": (["oring", "--tolerance", "small"], 'tolerance = "small"'),
-    "zero tolerance": (["oring", "--tolerance", "0%"], "--tolerance: tolerance = 0"),
-    "no tolerance there": (["slider", "--tolerance", "1%"], "--tolerance: unknown key"),
-    "uniform tolerance": (
-        ["oring", "--tolerance", "1%", "--set", "mesh=uniform"],
-        "needs an estimate",
-    ),
-    "no speeds": (["oring", "--set", "speeds=[]"], "speeds = []"),
-    "zero speed": (["oring", "--set", "speeds=[100, 0]"], "speeds = [100, 0]"),
-    "negative speed": (["oring", "--set", "speeds=[-100]"], "speeds = [-100]"),
-    "speed twice": (["oring", "--set", "speeds=[100, 100.0]"], "a number is given twice"),
-    "density": (["oring", "--set", "density=3"], "allowed: mesh density d"),
-    "bool for number": (["oring", "--set", "mu_1=true"], "mu_1 = true"),
-    "no TOML value": (["oring", "--set", "speeds=[100"], "not a TOML value"),
-    "no value": (["oring", "--set", "density"], "allowed is KEY=VALUE, see softehl keys"),
-    "geometry": (["oring", "--set", "rod_diameter=40"], "gap between rod and housing"),
-    "unknown case": (["o-ring"], "did you mean 'oring'"),
-    "capitals": (["ORING"], "did you mean 'oring'"),
-    "key as an option": (
-        ["oring", "--ring", "AS568-210"],
-        "; a key of the case is set by --set KEY=VALUE, as in --set ring=...",
-    ),
-    "key without an option": (["oring", "ring=AS568-210"], "; a key of the case is set by --set"),
-    "option misspelt": (["oring", "--overwite"], "Did you mean '--overwrite'?"),
-    "pictures": (["oring", "--pictures", "pdf"], "'pdf' is not one of 'png', 'svg', 'both'"),
-    "missing file": (["missing.toml"], "no case or file 'missing.toml'"),
-    "folder for file": (["."], "cannot read the case file"),
-    "broken file": (["broken.toml"], "broken.toml: not a TOML file"),
-    "binary file": (["binary.toml"], "binary.toml: not a TOML file"),
-    "file without case": (["nameless.toml"], 'allowed: case = "oring"'),
-    "file with unknown case": (["other.toml"], 'case = "piston"'),
-    "file with unknown key": (["typo.toml"], "typo.toml: unknown key 'speed'"),
-    "file with code": (["code.toml"], r"sealed_pressure = \"__import__('os')"),
-    "file with a table": (["nested.toml"], "density = {"),
-    "out is a file": (["oring", "--out", "typo.toml"], "is not a folder"),
-    "out below a file": (["oring", "--out", "typo.toml/deep/er"], "is not a folder"),
-    "out cannot be": (["oring", "--out", "/proc/softehl/oring"], "/proc"),
-    "unknown option": (["oring", "--dens", "4"], "--dens"),
-    "jobs": (["oring", "--jobs", "0"], "--jobs"),
-    "jobs in words": (["oring", "--jobs", "two"], "; allowed: a whole number from 1"),
-    "no case": ([], "CASE'; allowed: oring, slider, cycle or a TOML file"),
-    "section for a case": (["u_cup"], "cycle, as in softehl run oring --set section=u_cup"),
-    "one time": (["cycle", "--set", "motion=[[0,100]]"], "motion: times 0: at least two, rising"),
-    "times that stand": (
-        ["cycle", "--set", "pressures=[[0,1],[0,2]]"],
-        "pressures: times 0, 0: at least two, rising",
-    ),
-}
+
 CASE_FILES: Mapping[str, bytes] = {
     "broken.toml": b'case = "oring\ndensity = 4',
     "binary.toml": b"\xff\xfe\x00",
@@ -340,15 +257,14 @@ CASE_FILES: Mapping[str, bytes] = {
 }
 
 
-@pytest.mark.parametrize("what", BAD)
-def test_bad_input(what: str, here: Path, invoke: Invoke) -> None:
+@pytest.mark.parametrize(("arguments", "words"), REFUSED["run"])
+def test_bad_input(arguments: list[str], words: str, here: Path, invoke: Invoke) -> None:
     for name, content in CASE_FILES.items():
         (here / name).write_bytes(content)
-    arguments, words = BAD[what]
     code, out, err = invoke("run", *arguments)
     assert (code, out, len(err)) == (2, [], 1)
     assert err[0].startswith("softehl: ")
-    assert words.replace("\\", "") in err[0].replace("\\", "")
+    assert words in err[0].replace("\\", "")
     assert names(here) == set(CASE_FILES)
     assert [path for path in here.iterdir() if path.is_dir()] == []
 
@@ -416,24 +332,6 @@ def test_a_pressure_that_is_not_known_to_run_is_warned_of_first(here: Path, invo
     )
 
 
-def test_a_pressure_far_beyond_what_runs_is_refused(invoke: Invoke) -> None:
-    keys = ("--set", "material=NBR 70", "--set", "sealed_pressure=160 bar")
-    code, _, err = invoke("run", "oring", *FAST, *keys)
-    assert code == 2
-    assert "sealed_pressure = 16 MPa is 8.7 times the shear modulus of the rubber" in err[-1]
-    assert "up to 6 times" in err[-1]
-
-
-def test_a_run_says_what_it_assumed(here: Path, invoke: Invoke) -> None:
-    (here / "case.toml").write_text('case = "oring"\nring = "AS568-210"\nrod = 19\n')
-    code, out, _ = invoke("run", "case.toml", *FAST)
-    (line,) = (text for text in out if text.startswith("assumed: "))
-    assert code == 0
-    assert "65.9 mPa s" in line
-    assert "a rod of" not in line
-    assert invoke("run", "case.toml", *FAST, "--quiet", "--overwrite")[1] == []
-
-
 def test_run_json(here: Path, invoke: Invoke) -> None:
     assert invoke("run", "oring", *FAST, "--set", "density=4", "--out", "a")[0] == 0
     content = run_json(here / "a")
@@ -488,63 +386,6 @@ def test_a_tolerance_that_no_mesh_meets_is_named(here: Path, invoke: Invoke) -> 
     assert {row[-2] for row in rows(here / "results" / "oring")} == {"16"}
 
 
-def test_a_tolerance_goes_on_where_a_film_collapsed(here: Path, invoke: Invoke) -> None:
-    def solver(parameters: Seal, observer: Observer) -> Outcome:
-        return (solve_roughly if parameters.density > 2 else solve_and_collapse)(
-            parameters, observer
-        )
-
-    arguments = (*FAST, "--set", "stroke=out", "--tolerance", "1%")
-    assert invoke("run", "oring", *arguments, solver=solver)[0] == 0
-    folder = here / "results" / "oring"
-    assert [row[-2:] for row in rows(folder)] == [["4", "ok"], ["4", "ok"]]
-    assert run_json(folder)["rejected"] == []
-
-
-def test_quiet(here: Path, invoke: Invoke) -> None:
-    assert invoke("run", "oring", *FAST, "--quiet") == (0, [], [])
-
-
-def test_plots_are_the_same_every_time(here: Path, invoke: Invoke) -> None:
-    invoke("run", "oring", *FAST, "--out", "a", "--pictures", "both", plots=True)
-    invoke("run", "oring", *FAST, "--out", "b", "--pictures", "both", plots=True)
-    for name in PLOTS | SVG:
-        assert (here / "a" / name).read_bytes() == (here / "b" / name).read_bytes()
-
-
-def test_pictures_of_the_kind_that_was_asked_for(here: Path, invoke: Invoke) -> None:
-    """Asked again of a finished run they are drawn again, and those of before do not stay."""
-    invoke("run", "oring", *FAST, "--out", "a", "--pictures", "none", plots=True)
-    assert names(here / "a") == FILES
-    invoke("run", "oring", *FAST, "--out", "a", "--resume", "--pictures", "svg", plots=True)
-    assert names(here / "a") == FILES | SVG
-    invoke("run", "oring", *FAST, "--out", "a", "--resume", plots=True)
-    assert names(here / "a") == FILES | PLOTS
-
-
-def test_strokes_side_by_side(here: Path, invoke: Invoke) -> None:
-    code, _, err = invoke("run", "oring", *FAST, "--jobs", "2")
-    assert code == 0, err
-    assert names(here / "results" / "oring") == FILES
-    assert speeds(here / "results" / "oring") == [400.0, 100.0, -400.0, -100.0]
-
-
-def test_side_by_side_kernel_error(here: Path, invoke: Invoke) -> None:
-    code, _, err = invoke("run", "oring", "--jobs", "2", solver=solve_without_kernels)
-    assert (code, len(err)) == (2, 1)
-    assert list(here.iterdir()) == []
-
-
-def test_side_by_side_death(here: Path, invoke: Invoke) -> None:
-    code, _, err = invoke("run", "oring", *FAST, "--jobs", "2", solver=solve_instroke_dies)
-    folder = here / "results" / "oring"
-    assert code == 3
-    assert "ended from outside: in: its process was ended from outside" in err[-1]
-    assert "not reached: U = -100 mm/s" in err[-1]
-    assert speeds(folder) == [400.0, 100.0, -400.0], "what the others and it had is kept"
-    assert run_json(folder)["status"] == "not converged"
-
-
 def test_not_converged(here: Path, invoke: Invoke) -> None:
     code, out, err = invoke("run", "oring", *FAST, solver=solve_and_stop)
     folder = here / "results" / "oring"
@@ -570,24 +411,6 @@ def test_a_shape_that_cannot_be_meshed_is_one_line(here: Path, invoke: Invoke) -
     folder = here / "results" / "oring"
     assert run_json(folder)["status"] == "interrupted"
     assert speeds(folder) == [400.0]
-
-
-def test_a_doubt_is_told_with_its_own_reason(here: Path, invoke: Invoke) -> None:
-    """The sealed pressure that ends at nothing is no error of the mesh; a resumed run knows it."""
-    arguments = ("run", "oring", *FAST, "--set", "stroke=out")
-    told = "uncertain: It ends at its crown.: U = +400 mm/s, U = +100 mm/s"
-    assert told in invoke(*arguments, solver=solve_unsealed)[1]
-    folder = here / "results" / "oring"
-    assert {s["advice"] for s in run_json(folder)["states"]} == {"It ends at its crown."}
-    assert told in invoke(*arguments, "--resume")[1]
-    finished = read_finished(folder, SHIPPED)
-    assert set(advice_of(finished.content, finished.rows).values()) == {"It ends at its crown."}
-
-
-def test_a_missing_state_is_noticed(here: Path, invoke: Invoke) -> None:
-    code, _, err = invoke("run", "oring", *FAST, "--set", "stroke=out", solver=solve_and_forget)
-    assert code == 3
-    assert "not reached: U = +100 mm/s" in err[-1]
 
 
 def test_a_collapsed_film_is_no_result(here: Path, invoke: Invoke) -> None:
@@ -683,11 +506,6 @@ def test_resume_refuses_a_record_it_cannot_read(content: str, here: Path, invoke
     assert "--overwrite begins anew" in err[0]
 
 
-def test_resume_of_nothing_is_a_run(here: Path, invoke: Invoke) -> None:
-    assert invoke("run", "oring", *FAST, "--resume")[0] == 0
-    assert names(here / "results" / "oring") == FILES
-
-
 def test_a_new_run_replaces_the_earlier_one_only_where_it_may(here: Path, invoke: Invoke) -> None:
     invoke("run", "oring", "--set", "speeds=[25]", "--out", "a")
     (here / "a" / "notes.txt").write_text("mine")
@@ -713,19 +531,6 @@ def test_a_foreign_folder_is_refused(options: tuple[str, ...], here: Path, invok
         assert names(here / "a") == {"curve.png"}
 
 
-def test_a_foreign_folder_keeps_its_files(here: Path, invoke: Invoke) -> None:
-    (here / "a").mkdir()
-    (here / "a" / "profile_of_mine.csv").write_text("mine")
-    assert invoke("run", "oring", *FAST, "--out", "a", "--overwrite")[0] == 0
-    assert (here / "a" / "profile_of_mine.csv").read_text() == "mine"
-
-
-def test_hidden_files_make_no_folder_foreign(here: Path, invoke: Invoke) -> None:
-    (here / "a").mkdir()
-    (here / "a" / ".directory").write_text("mine")
-    assert invoke("run", "oring", *FAST, "--out", "a")[0] == 0
-
-
 def _study(here: Path) -> str:
     """A sweep of two runs."""
     (here / "two.toml").write_text('case = "oring"\n[grid]\nsealed_pressure = [1, 2]\n')
@@ -743,13 +548,3 @@ def test_a_full_disk_is_one_line(
     assert (code, len(err)) == (2, 1)
     assert "cannot write 'results/oring': No space left on device" in err[0]
     assert run_json(here / "results" / "oring")["status"] == "interrupted"
-
-
-def test_a_linear_solver_that_is_missing_is_bad_input(
-    here: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("softehl.runtime.solve.linear.pardiso.available", lambda: False)
-    code, out, err = invoke("run", "oring", *FAST, "--set", "linear=pardiso", solver=solve_really)
-    assert (code, out, len(err)) == (2, [], 1)
-    assert 'allowed here: "auto" or "superlu"' in err[0]
-    assert list(here.iterdir()) == []

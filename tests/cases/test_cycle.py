@@ -10,25 +10,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from PIL import Image
-from pydantic import ValidationError
 
 import softehl
 from softehl.cases.cycle import CASE, Cycle, cycle_row
-from softehl.cases.harness.pictures import titled
 from softehl.cases.seal.cycle import cycles
 from softehl.cases.seal.cycle.cycles import Films
 from softehl.cases.seal.cycle.motion import Motion, RodFilm, Table
 from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE, VOID
-from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.cycle import (
-    film_map,
     loop_figure,
-    map_figure,
-    moving_section,
-    write_animation,
 )
 from softehl.cases.slider.strip import Oil, Strip
 from softehl.runtime.arrays import Array
@@ -40,7 +31,6 @@ from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.newton import Newton
 from tests.reference.calling import fitted_order
 
-VALIDATION = Path(__file__).parents[2] / "docs" / "validation"
 ETA = 6.59e-8
 Gap = Callable[[float], float]
 
@@ -308,43 +298,6 @@ def test_other_motions_balance_too(
     assert loop["sealed_pressure_MPa"].max() == pytest.approx(highest)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("frequency", [0.5, 10.0])
-def test_slow_and_fast_cycles_are_periodic_by_the_third(frequency: float, tmp_path: Path) -> None:
-    table = cycle(tmp_path / "c", f"frequency={frequency}")
-    assert table["mass_error"].max() < 1e-9
-    assert table["change_percent"][-1] < 0.5
-    page = (VALIDATION / "films.md").read_text(encoding="utf-8")
-    (line,) = [x for x in page.splitlines() if x.startswith("| largest friction of a cycle")]
-    said = [float(v) for v in line.split("|")[3].split(",")]
-    expected = said[0] if frequency < 1.0 else said[2]
-    assert table["friction_out_N"][-1] == pytest.approx(expected, rel=0.01)
-
-
-def film_and_loop(times: int = 12, nodes: int = 9) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Tables of a made-up cycle: h = 1 + x^2 + t um, friction 2 N against the rod."""
-    t, x = np.linspace(0.1, 1.0, times), np.linspace(-1.0, 1.0, nodes)
-    h = 1.0 + x**2 + t[:, None]
-    film = {
-        "t_s": np.repeat(t, nodes),
-        "x_mm": np.tile(x, times),
-        "h_um": h.ravel(),
-        "p_MPa": np.tile(1.0 - x**2, times),
-    }
-    U = 10.0 * np.cos(2.0 * np.pi * t)
-    loop = {"t_s": t, "rod_speed_mm_s": U, "place_mm": np.sin(t), "friction_N": 2.0 * np.sign(U)}
-    return film, loop
-
-
-def test_the_map_of_a_film_has_a_line_for_every_time() -> None:
-    film, loop = film_and_loop()
-    times, x, h, p = film_map(film)
-    assert h.shape == p.shape == (len(times), len(x)) == (12, 9)
-    np.testing.assert_allclose(h, 1.0 + x**2 + times[:, None])
-    speed, axes, _ = map_figure(film, loop).axes
-    assert speed.get_ylim() == axes.get_ylim()
-
-
 def _reading(t: float, place: float, speed: float, friction: float) -> Reading:
     names = {field.name: 1.0 for field in fields(Reading)}
     known = {"t_s": t, "place_mm": place, "rod_speed_mm_s": speed, "friction_N": friction}
@@ -368,55 +321,3 @@ def test_the_loop_closes_and_costs_what_the_table_says() -> None:
     legend = axes.get_legend()
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == [f"{k}: 8 mJ" for k in loops]
-
-
-def test_titles_part_quantity_and_unit() -> None:
-    titles = {"p_MPa": "p [MPa]", "h_um": "h [µm]", "place_mm": "place [mm]", "x": "x"}
-    titles |= {"flux_mm2_s": "flux [mm2/s]", "flux_air_mm2_s": "flux air [mm2/s]"}
-    assert {name: titled(name) for name in titles} == titles
-
-
-def test_an_animation_moves(tmp_path: Path) -> None:
-    film, loop = film_and_loop()
-    p, angle = Seal(), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
-    outline = {
-        "t_s": np.repeat([0.1, 1.0], 40),
-        "z_mm": np.tile(1.7 * np.cos(angle), 2),
-        "r_mm": np.concatenate([26.6 + 1.5 * np.sin(angle), 26.6 + 1.4 * np.sin(angle)]),
-    }
-    write_animation(tmp_path / "cycle.gif", p, film, loop, outline)
-    with Image.open(tmp_path / "cycle.gif") as image:
-        assert getattr(image, "n_frames", 1) >= 12
-    assert [path.name for path in tmp_path.iterdir()] == ["cycle.gif"]
-
-
-def test_the_section_and_the_rod_of_an_animation_move() -> None:
-    p, axes = Seal(), Figure().subplots()
-    outline = {
-        "t_s": np.repeat([0.0, 1.0], 4),
-        "z_mm": np.tile([-1.0, 1.0, 1.0, -1.0], 2),
-        "r_mm": np.array([25.0, 25.0, 28.0, 28.0, 25.1, 25.1, 28.0, 28.0]),
-    }
-    show = moving_section(axes, p, outline)
-    ring, marks = show(0.9, 0.3)
-    np.testing.assert_allclose(ring.get_xy()[:4, 1], [25.1, 25.1, 28.0, 28.0])
-    first = np.array(marks.get_xdata())
-    _, marks = show(0.9, 0.8)
-    np.testing.assert_allclose(np.array(marks.get_xdata()), first + 0.5)
-
-
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        ({"motion": {"stroke": 20, "speed": 2}}, "'speed' is not known"),
-        ({"motion": "nowhere.csv"}, "no CSV"),
-        ({"motion": [[0, 0], [1, 5]]}, "begin with an outstroke"),
-        ({"motion": [[0, 1], [0, 5]]}, "rising from 0"),
-        ({"cavitation": "penalty"}, "leave cavitation out"),
-        ({"frequency": 0}, "greater than 0"),
-        ({"housing_friction": 0.2}, "leave housing_friction out"),
-    ],
-)
-def test_what_does_not_fit_is_said(keys: dict[str, Any], words: str) -> None:
-    with pytest.raises((ValidationError, ValueError), match=words):
-        Cycle.model_validate(Cycle.completed(keys))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -15,18 +14,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rich.console import Console
 
 import softehl
 from softehl.cases import oring
-from softehl.cases.harness import table
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.lock import FolderLock
 from softehl.cases.harness.record import table_digests
 from softehl.cases.harness.report.page import read_finished
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.states.state import FilmRow, Observer
+from softehl.cases.seal.states.state import Observer
 from softehl.cases.shipped import SHIPPED
 from tests.cases.test_cli import FAST, Fake, film_state, solve
 
@@ -148,10 +145,6 @@ def test_a_curve_that_is_cut_is_mended(
     assert (done / "curve.csv").read_bytes() == before
 
 
-def test_what_is_whole_is_kept(done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert resumed(monkeypatch) == (0, [])
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -240,14 +233,6 @@ def test_a_lock_is_for_one(tmp_path: Path) -> None:
     second.release()
 
 
-@pytest.mark.parametrize(
-    "name", ["", ".", "..", "b/../a", "../evil", "/a", "contacts", " a", "a\0"]
-)
-def test_a_name_of_a_curve_is_one_component(name: str, tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="is no name for a curve"):
-        softehl.solve_cases({name: Seal()}, tmp_path)
-
-
 def run_slowly(folder: str) -> None:
     """A state, then a long silence."""
 
@@ -297,18 +282,3 @@ def test_a_file_without_end_is_no_case(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 # --- the terminal ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("width", [200, 100, 80, 60, 40, 20])
-def test_a_narrow_terminal_loses_columns_never_digits(
-    width: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rows = [FilmRow.part_of(film_state(Seal(), u)) for u in (1600.0, -0.123456)]
-    console = Console(width=width, force_terminal=True, record=True, legacy_windows=False)
-    monkeypatch.setattr(table, "Console", lambda **_: console)
-    with console.capture() as captured:
-        table.print_rows(CASE, rows)
-    text = re.sub(r"\x1b\[[0-9;]*m", "", captured.get())
-    assert "\N{HORIZONTAL ELLIPSIS}" not in text
-    assert "+1600" in text
-    assert ("not shown" in text) == (width < 100)

@@ -17,7 +17,6 @@ from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.squeeze_film import film_layer, film_loads
 from softehl.cases.seal.states.state import Outcome
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear.direct import choose
 from softehl.runtime.solve.solution import Solution, Status
 from tests.cases.oring_cases import oring
 from tests.cases.test_method import Recorder
@@ -65,17 +64,6 @@ def test_the_cost_of_the_fast_route() -> None:
         )
         assert few <= 5
         assert many > 4 * few
-
-
-def test_superlu_does_it_too() -> None:
-    superlu, default = solved("auto", 1.0, "superlu", density=1), solved("auto", 1.0, density=1)
-    assert {k: superlu.solvers[k] for k in ("solver", "linear")} == {
-        "solver": "auto",
-        "linear": "superlu",
-    }
-    assert default.solvers["linear"] == choose("auto").name
-    for a, b in zip(superlu.states, default.states, strict=True):
-        assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-8)
 
 
 def test_the_discontinuous_film_is_condensed_too() -> None:

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.adaptation import FITS, Adaptation, Adapted
@@ -85,19 +84,6 @@ def test_a_film_from_a_neighbour_is_that_from_the_contact(
     assert gap(found) != pytest.approx(gap(films[last[-1]]), rel=1e-2)
 
 
-@pytest.mark.parametrize("moment", ["begun", "steady"])
-def test_a_film_that_goes_on_from_a_moment_is_the_same(
-    dry: DryContact, films: dict[float, Film], moment: str
-) -> None:
-    """From its steady state, and from that of another speed."""
-    film = films[100.0 if moment == "steady" else 800.0]
-    squeeze_film, start = film.begun
-    transfer = FilmTransfer(film.system, film.system, (dry.x, dry.x))
-    at = squeeze_film if moment == "steady" else squeeze_film.at(100.0)
-    found = a_film(solver(dry).from_film(at, start, transfer.pressures(film.x)))
-    assert gap(found) == pytest.approx(gap(films[100.0]), rel=1e-6)
-
-
 # ------------------------------------------------------------------------------- on another mesh
 
 
@@ -172,18 +158,6 @@ def test_a_mesh_that_is_given_is_not_made_anew(dry: DryContact, films: dict[floa
 
 
 # --------------------------------------------------------------------------------- of whole runs
-
-
-def test_films_do_not_depend_on_the_speeds_that_were_asked_for_before() -> None:
-    """But for their meshes, which films of several speeds share where these fit them."""
-    given: dict[str, Any] = {**RING, "density": 2, "stroke": "out"}
-    many, few = (
-        run(Seal(**given, speeds=speeds), Silent()).states
-        for speeds in ((800.0, 200.0, 50.0), (50.0,))
-    )
-    assert many[-1].rod_speed == few[-1].rod_speed == 50.0
-    assert many[-1].verdict == few[-1].verdict == OK
-    assert many[-1].h_star_um == pytest.approx(few[-1].h_star_um, rel=1e-2)
 
 
 @pytest.mark.slow

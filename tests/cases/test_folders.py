@@ -75,14 +75,6 @@ def test_the_readmes_first_block_runs_in_one_folder(
     assert {path.name for path in Path("results").iterdir()} == {"oring", "oring-2"}
 
 
-@pytest.mark.slow
-def test_the_readmes_first_block_runs_as_it_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert [pasted(line) for line in first_block()] == [0] * len(first_block())
-
-
 def test_the_readmes_python_prints_what_it_shows_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -93,16 +85,3 @@ def test_the_readmes_python_prints_what_it_shows_twice(
         reader = Reader(tmp_path)
         for block in found[:2]:
             reader.read(block)
-
-
-def test_another_case_and_a_sweep_run_twice(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("two.toml").write_text('case = "slider"\n[grid]\nviscosity = [1e-8, 2e-8]\n')
-    for _ in range(2):
-        assert pasted(["run", "slider"]) == 0
-        assert pasted(["sweep", "two.toml"]) == 0
-    assert {path.name for path in Path("results").iterdir()} == {
-        *("slider", "slider-2", "two", "two-2"),
-    }

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.equations.system import FRICTION, SHEAR, WALLS
+from softehl.cases.seal.equations.system import SHEAR, WALLS
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
@@ -63,16 +63,3 @@ def test_stresses_of_the_walls_stay_within_coulombs_cone() -> None:
     assert max(shares) == pytest.approx(0.2, rel=1e-9)
     assert max(shares) > 0.19
     assert contact_problem(system, 1.0).since(x).residual(x) == pytest.approx(0.0, abs=1e-6)
-
-
-def test_without_friction_nothing_of_it_is_in_the_system() -> None:
-    p = Seal(density=1)
-    kernels = [b.kernel.name for b in _system(p).problem.assembler.blocks]
-    assert FRICTION not in kernels
-    assert not set(SHEAR.values()) & set(_system(p).layout.names)
-
-
-def _system(p: Seal) -> Any:
-    from softehl.cases.seal.equations.equations import build_system
-
-    return build_system(p)

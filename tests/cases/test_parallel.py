@@ -13,7 +13,6 @@ from typing import Any
 
 import pytest
 
-import softehl
 from softehl.cases.harness import observer as harness
 from softehl.cases.harness.case import Run
 from softehl.cases.harness.errors import BadInput
@@ -27,7 +26,7 @@ from softehl.cases.shipped import solve_cases
 from softehl.runtime.kernels.kernel import ArgumentError, MissingKernelsError, StaleKernelsError
 from softehl.runtime.solve.linear.direct import MissingBackend
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
-from tests.cases.elsewhere import double, fail, touch, wait_in_a_worker
+from tests.cases.elsewhere import double, fail, wait_in_a_worker
 from tests.cases.test_cli import outcome
 
 ERRORS = (
@@ -68,12 +67,6 @@ def test_an_error_comes_back_as_what_it_is(number: int, pool: Executor) -> None:
     with pytest.raises(type(ERRORS[number])) as raised:
         list(completed(fail, [ERRORS[number]], pool))
     assert raised.value.args == ERRORS[number].args
-
-
-def test_after_an_error_nothing_more_is_begun(tmp_path: Path) -> None:
-    with processes(1) as executor, pytest.raises(ZeroDivisionError):
-        list(completed(touch, [tmp_path / f"{n}" for n in range(20)], executor))
-    assert not (tmp_path / "19").exists()
 
 
 def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
@@ -214,12 +207,3 @@ def test_one_curve_of_each_section_comes_first() -> None:
     cases = [*SWEEP, case(density=2, stroke="in"), case(density=2, mu_1=3.0)]
     tasks = [Task(Run(CASE, c), Path(str(n)), "refuse") for n, c in enumerate(cases)]
     assert [task.folder.name for task in in_order(tasks)] == ["4", "5", "0", "2", "1", "3"]
-
-
-def test_names_of_folders(tmp_path: Path) -> None:
-    assert softehl.solve_cases({}, tmp_path) == []
-    with pytest.raises(BadInput, match="same folder; allowed: a dict"):
-        solve_cases([case(), case(solver="monolithic")], tmp_path)
-    with pytest.raises(BadInput, match="too long; allowed: a dict"):
-        solve_cases([case(speeds=tuple(1.0 + n for n in range(100)))], tmp_path)
-    assert list(tmp_path.iterdir()) == []

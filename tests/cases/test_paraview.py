@@ -12,11 +12,11 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.paraview import PARTS, gland_outlines, write_paraview
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.states.section_view import film_pressure, principal_stretches, section_view
-from softehl.cases.seal.states.state import FilmRow, Silent
+from softehl.cases.seal.states.section_view import principal_stretches, section_view
+from softehl.cases.seal.states.state import Silent
 from softehl.runtime.analyses.callbacks import read_series
 from softehl.runtime.arrays import Array, Integers
-from tests.cases.oring_cases import film_values, oring
+from tests.cases.oring_cases import oring
 
 DOCS = Path(__file__).parents[2] / "docs"
 X_RING: dict[str, Any] = {
@@ -131,26 +131,6 @@ def test_stretches_of_the_way_back_are_others() -> None:
     expected = stretches_of_one(before[cells[0]], after[cells[0]])
     with pytest.raises(AssertionError):
         np.testing.assert_allclose(found, expected, rtol=1e-3)
-
-
-def test_film_pressure_at_a_facet_is_the_mean_of_its_sides() -> None:
-    system = build_system(oring(density=1, reynolds="dg"))
-    x = system.at_rest()
-    ends = system.pressure_dofs()
-    x[ends[:, 0]], x[ends[:, -1]] = 1.0, 3.0
-    assert film_pressure(system, x) == pytest.approx([1.0, *[2.0] * (len(ends) - 1), 3.0])
-
-
-def test_the_series_goes_up_in_speed_and_has_no_other_stroke(tmp_path: Path) -> None:
-    rows = [row(u) for u in (400.0, 25.0, 100.0, -50.0)]
-    write_paraview(Seal(), tmp_path, rows)
-    named = [(u, f"section_1_{u:g}.vtu") for u in (25.0, 100.0, 400.0)]
-    assert read_series(tmp_path / "section_out.pvd") == named
-    assert read_series(tmp_path / "section_in.pvd") == [(50.0, "section_1_-50.vtu")]
-
-
-def row(speed: float) -> FilmRow:
-    return FilmRow(**film_values(sealed_pressure_MPa=1.0, rod_speed_mm_s=speed))
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.1])

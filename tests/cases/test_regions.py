@@ -6,8 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.harness.case_file import read_case
-from softehl.cases.harness.errors import BadInput
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import ContactLoads
 from softehl.cases.seal.gland.parameters import Seal
@@ -17,7 +15,6 @@ from softehl.cases.seal.solve.inlet import inlet_length
 from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.contacts import contact_pressure
 from softehl.cases.seal.states.state import Silent
-from softehl.cases.shipped import SHIPPED
 from softehl.runtime.arrays import Array
 
 CAPPED: dict[str, Any] = {
@@ -38,58 +35,6 @@ def test_a_cap_is_of_ptfe() -> None:
     assert PRESETS["ptfe"]["mu"] == pytest.approx(E / (2.0 + 2.0 * nu), rel=2e-3)
     assert PRESETS["ptfe"]["bulk_modulus"] == pytest.approx(E / (3.0 - 6.0 * nu), rel=2e-3)
     assert inlet_length(p, 1.0, 100.0) > inlet_length(Seal(), 1.0, 100.0)
-
-
-@pytest.mark.parametrize(
-    ("given", "modulus"),
-    [
-        (["materials.cap=ptfe"], 171.0),
-        (["materials.cap.mu=200 MPa"], 200.0),
-        (["materials.cap.shore_A=90"], 6.947993),
-        (['materials={cap={material="gent", mu=3, J_m=30}}'], 3.0),
-        (["materials.cap.material=gent", "materials.cap.mu=3", "materials.cap.J_m=30"], 3.0),
-    ],
-)
-def test_what_one_types_for_a_cap(given: list[str], modulus: float) -> None:
-    words = ["section=rectangular", "groove_width=4.3", "cap_thickness=0.6", *given]
-    p = read_case("oring", SHIPPED, words).parameters
-    assert isinstance(p, Seal)
-    assert p.surface_modulus == pytest.approx(modulus)
-    assert Seal(**p.model_dump()) == p
-
-
-@pytest.mark.parametrize(
-    ("given", "reason"),
-    [
-        (["cap_thickness=0.2"], r"cap_thickness = 0.2 mm: it must hold the film, .* 0.2965 mm"),
-        (["cap_thickness=5"], "less than the height, 3.53 mm"),
-        (["materials.cap=teflon"], "materials.cap.material: .* 'gent'; or ptfe"),
-        (["materials.cap.mu=-3"], "materials.cap.mu: input should be greater than 0"),
-        (["materials.cap.nu=0.3"], "materials.cap.nu: extra inputs"),
-        (["materials.lip=ptfe"], "materials.lip: the section has cap"),
-        (["materials.cap=3"], "materials.cap = 3: allowed is a table"),
-        (["materials.cap.fit=a.csv"], "materials.cap: fit is for the whole section"),
-        (["solid=q4", 'materials.cap={material="gent", mu=3, J_m=30}'], 'material = "gent"'),
-        (["section=x_ring", "cap_thickness=0.1"], "the section is in 2 parts there"),
-    ],
-)
-def test_a_cap_that_is_none(given: list[str], reason: str) -> None:
-    words = ["section=rectangular", "groove_width=4.3", "corner_radius=0.4", "cap_thickness=0.6"]
-    if given[0].startswith("section"):
-        words = words[1:2]
-    keys = {word.partition("=")[0] for word in given}
-    words = [word for word in words if word.partition("=")[0] not in keys]
-    with pytest.raises(BadInput, match=reason) as error:
-        read_case("oring", SHIPPED, [*words, *given])
-    assert "\n" not in str(error.value)
-
-
-def test_regions_need_a_section_that_has_them() -> None:
-    bare: dict[str, Any] = {"section": "rectangular", "materials": {"cap": "ptfe"}}
-    with pytest.raises(ValueError, match="no regions; cap_thickness makes one"):
-        Seal(**bare)
-    with pytest.raises(ValueError, match='not for section = "round"'):
-        Seal(cap_thickness=0.5)
 
 
 def _state(system: SealSystem, size: float) -> Array:

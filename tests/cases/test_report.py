@@ -2,14 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import nan
 from typing import Any
 
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
@@ -21,17 +19,12 @@ from softehl.cases.seal.gland.surfaces import regime
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure, fitted_exponent
 from softehl.cases.seal.report.drawing import gland_figure
-from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import (
     View,
-    boundary_edges,
-    draw_gland,
     nodal_von_mises,
     section_figure,
 )
 from softehl.cases.seal.report.stribeck import crossing, hersey_um, stribeck_figure
-from softehl.cases.seal.report.tables import SHOWN
-from softehl.cases.seal.report.tornado import tornado_figure
 from softehl.cases.seal.states.state import COLLAPSED, OSCILLATING, FilmRow, Profile, Section
 from tests.cases.oring_cases import film_values
 
@@ -108,29 +101,6 @@ def legend(axes: Axes) -> list[str]:
 # --- every picture -----------------------------------------------------------------------------
 
 
-def figures() -> dict[str, Figure]:
-    rows = power_law(0.6)
-    views = [View(r, profile(r.h_star_um), square()) for r in (rows[2], rows[5])]
-    results = [(r, profile(r.h_star_um)) for r in rows]
-    return {
-        "curve": curve_figure(HEAD, rows),
-        "profiles": profiles_figure(HEAD, results),
-        "section": section_figure(SEAL, views),
-    }
-
-
-@pytest.mark.parametrize("name", ["curve", "profiles", "section"])
-def test_a_picture_names_the_ring_the_oil_and_its_units(name: str) -> None:
-    written = texts(figures()[name])
-    assert "50.39 \N{MULTIPLICATION SIGN} 3.53 mm" in written
-    assert "3.66 MPa" in written
-    assert "65.9 mPa s" in written
-    assert "pₛ = 1 MPa" in written
-    assert "µm" in written
-    assert "um" not in written.split()
-    assert "[um]" not in written
-
-
 # --- film thickness over speed -----------------------------------------------------------------
 
 
@@ -146,45 +116,9 @@ def test_the_slope_is_the_measured_one(exponent: float) -> None:
     assert (drawn(dashed)[1] > [r.h_star_um for r in (rows[0], rows[2])]).all()
 
 
-def test_one_speed_has_no_slope() -> None:
-    rows = [row(100.0, 0.5), row(-100.0, 0.4)]
-    assert fitted_exponent(rows) is None
-    assert "slope" not in texts(curve_figure(HEAD, rows))
-
-
-def test_one_speed_is_a_bar_for_each_stroke() -> None:
-    rows = [row(400.0, 1.5, error=2.0), row(-400.0, 1.0, error=nan, verdict=OSCILLATING)]
-    figure = curve_figure(HEAD, rows)
-    (axes,) = figure.axes
-    assert (axes.get_xscale(), axes.get_yscale()) == ("linear", "linear")
-    assert [patch.get_height() for patch in axes.patches] == [1.5, 1.0]  # type: ignore[attr-defined]
-    said = texts(figure)
-    for words in ("|U| = 400 mm/s", "1.5 µm", "± 2 %", "1 µm\noscillating", "instroke"):
-        assert words in said
-    lost = texts(curve_figure(HEAD, [], [replace(row(400.0, 0.1), verdict=COLLAPSED)]))
-    assert "no result" in lost
-    assert "0.1 µm" not in lost
-
-
 def test_a_slope_is_not_fitted_to_doubtful_states() -> None:
     rows = [*power_law(0.6)[:3], row(25.0, 9.9, verdict=OSCILLATING)]
     assert fitted_exponent(rows) == pytest.approx(0.6, abs=1e-12)
-
-
-def test_error_bars_have_the_estimated_length() -> None:
-    rows = [row(100.0, 0.5, error=-2.0), row(400.0, 1.0, error=1.0), row(1600.0, 2.0, error=nan)]
-    axes = curve_figure(HEAD, rows).axes[0]
-    assert "outstroke (error bars: at most 2 %)" in legend(axes)
-    bars = next(artist for artist in axes.collections if isinstance(artist, LineCollection))
-    ends = np.array([np.asarray(segment)[:, 1] for segment in bars.get_segments()])
-    np.testing.assert_allclose(ends, [[0.49, 0.51], [0.99, 1.01]], rtol=1e-12)
-
-
-def test_without_an_estimate_there_are_no_bars() -> None:
-    rows = [row(speed, 0.5, error=nan) for speed in (100.0, 200.0)]
-    axes = curve_figure(HEAD, rows).axes[0]
-    assert legend(axes)[0] == "outstroke"
-    assert list(axes.containers) == []
 
 
 def test_verdicts_are_marked() -> None:
@@ -202,46 +136,7 @@ def test_verdicts_are_marked() -> None:
     assert y[0] < 0.05  # on the axis, not at its thickness
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "expected"),
-    [
-        (90.0, 1800.0, [100, 200, 500, 1000]),
-        (0.41, 4.0, [0.5, 1, 2]),
-        (0.001, 1000.0, [0.001, 0.01, 0.1, 1, 10, 100, 1000]),
-        (1.1, 4.5, [1.5, 2, 2.5, 3, 3.5, 4, 4.5]),
-    ],
-)
-def test_ticks_are_round_numbers(low: float, high: float, expected: list[float]) -> None:
-    assert style.plain_ticks(low, high).tolist() == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(("low", "high"), [(99.0, 101.0), (1e-9, 1e9), (0.7, 0.72)])
-def test_ticks_of_short_and_long_axes(low: float, high: float) -> None:
-    ticks = style.plain_ticks(low, high)
-    assert 2 <= len(ticks) <= 10
-    assert all(low <= tick <= high for tick in ticks)
-
-
-def test_ticks_are_written_out() -> None:
-    figure = curve_figure(HEAD, power_law(0.6))
-    assert "e-" not in texts(figure)
-    assert [t.get_text() for t in figure.axes[0].get_xticklabels()] == ["100", "200", "500", "1000"]
-
-
 # --- profiles ----------------------------------------------------------------------------------
-
-
-def test_profiles_have_a_panel_a_stroke_and_a_line_a_speed() -> None:
-    rows = [*power_law(0.6), row(25.0, 0.3, verdict=OSCILLATING)]
-    figure = profiles_figure(HEAD, [(r, profile(r.h_star_um)) for r in rows])
-    pressure_out, pressure_in, film_out, film_in = figure.axes
-    assert [len(axes.lines) for axes in figure.axes] == [4, 3, 4, 3]
-    assert (pressure_out.get_title(), pressure_in.get_title()) == ("outstroke", "instroke")
-    assert pressure_out.get_ylabel() == "pressure p [MPa]"
-    assert film_out.get_ylabel() == "film thickness h [µm]"
-    assert film_in.get_xlabel().startswith("x [mm]")
-    assert legend(film_out) == ["100", "400", "1600", "25 (oscillating)"]
-    assert [line.get_linestyle() for line in film_out.lines] == ["-", "-", "-", ":"]
 
 
 # --- the section -------------------------------------------------------------------------------
@@ -255,28 +150,6 @@ def test_von_mises_of_plain_stress_states() -> None:
     assert of(zz=-5.0, rr=-5.0, tt=-5.0) == pytest.approx(0.0, abs=1e-12)
     assert of(rr=3.0) == pytest.approx(3.0)
     assert of(zr=2.0) == pytest.approx(2.0 * 3.0**0.5)
-
-
-def test_boundary_edges_go_round_the_cells() -> None:
-    cells = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
-    edges = {tuple(edge) for edge in boundary_edges(cells).tolist()}
-    assert edges == {(0, 1), (1, 2), (2, 5), (5, 4), (4, 3), (3, 0)}
-
-
-def test_the_section_shows_both_strokes_with_one_scale() -> None:
-    rows = power_law(0.6)
-    views = [View(r, profile(r.h_star_um), square()) for r in (rows[2], rows[5])]
-    figure = section_figure(SEAL, views)
-    out, back = figure.axes
-    (bar,) = back.child_axes
-    assert out.get_title().startswith("outstroke, U = +1600 mm/s")
-    assert back.get_title().startswith("instroke, U = \N{MINUS SIGN}1600 mm/s")
-    assert bar.get_ylabel() == "von Mises stress [MPa]"
-    written = texts(figure)
-    assert "film pressure, max 3.7 MPa" in written
-    assert "contact pressure, max 3 MPa" in written
-    assert out.get_aspect() == 1.0
-    assert (out.get_xlabel(), out.get_ylabel()) == ("z [mm]", "r [mm]")
 
 
 GLANDS: tuple[dict[str, Any], ...] = (
@@ -296,30 +169,6 @@ def test_nothing_of_a_picture_is_cut_off(given: dict[str, Any]) -> None:
         drawn, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
         assert -0.02 < drawn.x0 < drawn.x1 < width + 0.02
         assert -0.02 < drawn.y0 < drawn.y1 < height + 0.02
-
-
-def test_the_legend_of_a_tornado_is_beside_its_bars() -> None:
-    slopes = {f"key_{k}": 10.0 - k for k in range(10)}
-    figure = tornado_figure(HEAD, {(u, name): slopes for u in (400.0, -400.0) for name in SHOWN})
-    figure.draw_without_rendering()
-    (found,) = figure.legends
-    for axes in figure.axes:
-        box = axes.get_tightbbox()
-        assert box is not None
-        assert not found.get_window_extent().overlaps(box)
-        assert axes.get_legend() is None
-
-
-def test_pressure_bands_are_to_scale() -> None:
-    r = power_law(0.6)[2]
-    out = section_figure(SEAL, [View(r, profile(r.h_star_um), square(1.85))]).axes[0]
-    paths = [path for artist in out.collections for path in artist.get_paths()]
-    r_of = np.concatenate([np.asarray(path.vertices)[:, 1] for path in paths])
-    film, contact = 25.0 - float(r_of.min()), float(r_of.max()) - 28.15
-    top = float(profile(1.0).p_MPa.max())
-    assert film == pytest.approx(0.25 * SEAL.section_diameter)
-    # the corners of the square have normals at 45 degrees
-    assert contact == pytest.approx(film * 1.85 / top * 0.5**0.5, rel=0.05)
 
 
 def rough_rows() -> list[FilmRow]:
@@ -359,27 +208,9 @@ def test_the_stribeck_picture_marks_regimes_and_shares() -> None:
     assert [line.get_linestyle() for line in shares.get_lines()].count("--") == 2
 
 
-def test_smooth_surfaces_have_no_stribeck_picture() -> None:
-    assert stribeck_figure(SEAL, power_law(0.6)) is None
-
-
-def test_one_speed_has_no_stribeck_picture() -> None:
-    p = Seal.model_validate({"roughness": 0.3})
-    assert stribeck_figure(p, [r for r in rough_rows() if abs(r.rod_speed_mm_s) == 4.0]) is None
-
-
 def test_films_that_flow_against_the_rod_are_left_out_of_the_curve() -> None:
     """Pressure drives oil through asperities faster than a slow rod: h* < 0."""
     rows = [*rough_rows(), replace(row(-0.01, 1.0), h_star_um=-0.2)]
     (axes,) = curve_figure(HEAD, rows).axes
     drawn = np.concatenate([np.asarray(line.get_ydata()) for line in axes.get_lines()])
     assert np.min(drawn) > 0.0
-
-
-def test_the_sealed_fluid_reaches_to_where_the_seal_touches() -> None:
-    """Into the mouth of a U-cup, which is deeper than the middle of the groove."""
-    for middle, end in ((None, 0.0), (0.9, 0.9)):
-        axes = Figure().subplots()
-        draw_gland(axes, Seal(sealed_pressure=1.0), middle)
-        fluid = axes.patches[0].get_path()
-        assert fluid.get_extents().x1 == pytest.approx(end)

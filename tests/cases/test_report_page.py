@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +12,11 @@ import numpy as np
 import pytest
 
 from softehl.__main__ import main
-from softehl.cases.harness.report.page import parts_of, read_finished
-from softehl.cases.seal.states.leakage import LeakageRow
+from softehl.cases.harness.report.page import read_finished
 from softehl.cases.seal.states.observer_adapter import read_profile
-from softehl.cases.seal.states.state import FilmRow
 from softehl.cases.shipped import SHIPPED
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-LARGEST = 5_000_000
 GIVEN = {
     **{"density": "1", "speeds": "[800, 200]", "error_estimate": "false"},
     "oil": '"ISO VG 46"',
@@ -72,35 +67,6 @@ def test_the_stress_on_the_rod_is_its_friction(runs: tuple[Path, Path]) -> None:
         assert np.median(difference) < 1e-2 * np.abs(profile.tau_rod_MPa).max()
 
 
-def test_the_answer_says_what_it_rests_on(page: str) -> None:
-    """What was assumed, what is doubtful, and how far off friction may be."""
-    answer = page[page.index("<h2>Answer") :].partition("</section>")[0]
-    for words in ("assumed: ", "a back-up ring", "a measured one by several times", "friction "):
-        assert words in answer, words
-
-
-def test_films_below_the_roughness_are_noted_in_the_answer(runs: tuple[Path, Path]) -> None:
-    run = read_finished(runs[0], SHIPPED)
-    thin = replace(run, rows=[replace(run.rows[0], h_min_um=0.01), *run.rows[1:]])
-    (answer,) = (part for part in parts_of([thin]) if part.title == "Answer")
-    assert any("smooth surfaces: films below" in line for line in answer.lines)
-
-
-def test_a_run_that_goes_on_has_an_answer_so_far(runs: tuple[Path, Path]) -> None:
-    run = read_finished(runs[0], SHIPPED)
-    begun = replace(run, rows=run.rows[:2], content={**run.content, "status": "running"})
-    assert begun.answer[0].startswith("so far, of 2 states: leakage is not known")
-    assert not run.answer[0].startswith("so far")
-
-
-def test_a_report_is_one_file_below_5_mb(page: str) -> None:
-    assert len(page.encode()) < LARGEST
-    outside = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
-    assert not re.search(r"""(src|href)\s*=\s*["'](?!data:)""", outside)
-    assert not re.search(r"""<script[^>]*\bsrc\b""", page)
-    assert len(re.findall("<li>", outside)) >= 10  # what the model leaves out
-
-
 def test_numbers_are_those_of_the_curve(runs: tuple[Path, Path], page: str) -> None:
     states = json.loads((runs[0] / "run.json").read_text(encoding="utf-8"))["states"]
     assert len(states) == 4
@@ -114,98 +80,6 @@ def both(runs: tuple[Path, Path]) -> Path:
     out = runs[0].with_name("both.html")
     assert main(["report", *map(str, runs), "--out", str(out), "--xlsx"]) == 0
     return out
-
-
-def test_a_report_without_plots_is_small_and_makes_its_folders(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder, out = str(tmp_path / "s"), tmp_path / "a" / "b" / "c.html"
-    keys = ["--set=profile=wedge", "--set=segments=8", "--set=speeds=100"]
-    assert main(["run", "slider", *keys, "--quiet", "--out", folder]) == 0
-    assert main(["report", folder, "--out", str(out)]) == 0
-    assert re.search(r"c\.html \(\d\d? kB\)", capsys.readouterr().out)
-    heads = re.findall(r"<th\b[^>]*>(.*?)</th>", out.read_text(encoding="utf-8"))
-    assert {"rod speed [mm/s]", "load [N/mm]", "error [%]", "verdict"} <= set(heads)
-
-
-def test_headings_are_the_names_of_columns() -> None:
-    titles = FilmRow.titles()
-    wanted = {"leak rate [mm3/s]", "moment [N mm]", "entrance pressure [MPa]", "lambda ratio"}
-    assert {*wanted, "h star error [%]", "regime", "verdict"} <= set(titles)
-    assert "net per 100 m [mm3]" in LeakageRow.titles()
-    assert len(set(titles)) == len(titles)
-
-
-def test_two_folders_side_by_side(runs: tuple[Path, Path], both: Path) -> None:
-    from openpyxl import load_workbook
-
-    text = both.read_text(encoding="utf-8")
-    assert len(text.encode()) < LARGEST
-    soft, hard = (json.loads((r / "run.json").read_text(encoding="utf-8"))["states"] for r in runs)
-    change = 100.0 * (hard[0]["h_star_um"] / soft[0]["h_star_um"] - 1.0)
-    assert "hard, difference in %" in text
-    assert f"<td>{change:.4g}</td>" in text
-    book = load_workbook(both.with_suffix(".xlsx"))
-    first = next(s for s in book.worksheets if s.title.startswith("Side by side"))
-    header = [cell.value for cell in first[2]]
-    assert header == ["U [mm/s]", "soft", "hard", "hard, difference in %"]
-    assert [cell.value for cell in first[3]] == pytest.approx(
-        [800.0, soft[0]["h_star_um"], hard[0]["h_star_um"], change]
-    )
-
-
-def test_runs_side_by_side_have_materials_and_leakage(runs: tuple[Path, Path], both: Path) -> None:
-    text = both.read_text(encoding="utf-8")
-    assert "Materials and leakage side by side" in text
-    for folder in runs:
-        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        assert f"<td>{content['parameters']['mu']:.4g}</td>" in text
-        assert f"<td>{100.0 * content['leakage'][0]['net_mm3_per_mm']:.4g}</td>" in text
-    heads = re.findall(r"<th\b[^>]*>([^<]*)</th>", text)
-    assert [head for head in heads if re.search(r"_(um|mm|mm_s|MPa|N|percent)\b", head)] == []
-
-
-@pytest.fixture(scope="module")
-def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A sweep of two keys of the seal, two values each."""
-    place = tmp_path_factory.mktemp("sweep")
-    study = place / "study.toml"
-    study.write_text(
-        'case = "oring"\nmaterial = "neo-hooke"\ndensity = 1\nspeeds = 400\nstroke = "out"\n'
-        "error_estimate = false\n"
-        "[grid]\nsealed_pressure = [0.5, 1]\nmu = [0.5, 0.9]\n",
-        encoding="utf-8",
-    )
-    assert main(["sweep", str(study), "--out", str(place / "runs"), "--quiet"]) == 0
-    return place / "runs"
-
-
-def test_a_sweep_has_a_pivot_table_and_its_best_and_worst_run(swept: Path) -> None:
-    from openpyxl import load_workbook
-
-    assert main(["report", str(swept), "--xlsx"]) == 0
-    text = (swept / "report.html").read_text(encoding="utf-8")
-    assert "over sealed pressure and mu</h1>" in text
-    book = load_workbook(swept / "report.xlsx")
-    pivot = [[c.value for c in row] for row in book["Largest friction N"].iter_rows()]
-    assert pivot[1] == [None, "mu = 0.5 MPa", "mu = 0.9 MPa"]
-    assert [row[0] for row in pivot[2:]] == ["sealed pressure = 0.5 MPa", "sealed pressure = 1 MPa"]
-    friction = {}
-    for number in range(1, 5):
-        content = json.loads((swept / f"runs/{number:05d}/run.json").read_text(encoding="utf-8"))
-        friction[number] = max(abs(state["rod_friction_N"]) for state in content["states"])
-    assert [v for row in pivot[2:] for v in row[1:]] == pytest.approx(list(friction.values()))
-    rows = {row[0].value: [c.value for c in row] for row in book["Best and worst"].iter_rows()}
-    best, worst = (choose(friction, key=friction.__getitem__) for choose in (min, max))
-    _, least, at, most, where = rows["largest friction [N]"]
-    assert (least, most) == pytest.approx((friction[best], friction[worst]))
-    assert f"(run {best})" in str(at)
-    assert f"(run {worst})" in str(where)
-    asked = [row[0].value for row in book["What was asked"].iter_rows()]
-    assert "speeds" in asked  # the same in all runs
-    assert not {"sealed_pressure", "mu"} & set(asked)
-    thin = rows["thinnest film [um]"]
-    assert float(str(thin[1])) > float(str(thin[3]))  # the thicker one is better
 
 
 def test_a_sweep_that_is_damaged_is_one_line(
@@ -227,11 +101,6 @@ def test_what_is_no_run_is_one_line(
     assert error.count("\n") == 1
     assert "holds no run" in error
     assert not (tmp_path / "report.html").exists()
-
-
-def test_a_report_is_no_pdf(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["report", str(tmp_path), "--out", str(tmp_path / "report.pdf")]) == 2
-    assert 'a report is a page; allowed: a name with ".html"' in capsys.readouterr().err
 
 
 # --- in a browser -------------------------------------------------------------------------------
@@ -275,18 +144,6 @@ def test_the_slider_moves_the_film_in_a_browser(
     )
     errors = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
     assert errors == []
-
-
-def test_a_page_fits_a_telephone(browser: Any, runs: tuple[Path, Path], swept: Path) -> None:
-    """Wide tables scroll by themselves; the page does not."""
-    assert main(["report", str(swept)]) == 0
-    narrow = {"width": 400, "height": 900, "deviceScaleFactor": 1, "mobile": True}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", narrow)
-    for page in (runs[0] / "report.html", swept / "report.html"):
-        browser.get(page.as_uri())
-        browser.execute_async_script("setTimeout(arguments[0], 500)")
-        assert browser.execute_script("return document.documentElement.scrollWidth") == 400
-    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 def test_an_error_of_a_page_is_seen(browser: Any, tmp_path: Path) -> None:

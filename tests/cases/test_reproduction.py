@@ -10,20 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import softehl
 from softehl.cases.harness import sweep
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.paper import compute as computing
-from softehl.cases.paper import docs_tables
 from softehl.cases.paper.catalogue import ITEMS
 from softehl.cases.paper.checks import observed_order
 from softehl.cases.paper.command import reproduce_items
 from softehl.cases.paper.inverse import film_of, largest_inlet_gradient
 from softehl.cases.paper.item import Scope
 from softehl.cases.paper.query import angle, ripple
-from softehl.cases.paper.states import NOT_REACHED, Store, ask, merged, setup
+from softehl.cases.paper.states import Store, ask, merged, setup
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.io import write_csv, write_json
@@ -60,17 +58,6 @@ def test_a_small_version_of_everything_and_nothing_twice(
     again = files(tmp_path)
     assert {"fig7.png", "fig7_states.csv", "fig17.csv", "statements.csv"} <= set(again)
     assert all(first[name] == content for name, content in again.items())
-
-
-def test_a_lost_file_is_computed_again(tmp_path: Path) -> None:
-    store, request = Store(tmp_path), ask(setup(1, 0.5), [1600.0])
-    computing.compute([request], store, resume=False, jobs=1)
-    assert computing.is_complete(request, store)
-    (lost,) = store.run_folder(request.setup).glob("profile_*.csv")
-    lost.unlink()
-    assert not computing.is_complete(request, store)
-    computing.compute([request], store, resume=True, jobs=1)
-    assert lost.exists()
 
 
 @pytest.mark.slow
@@ -161,13 +148,6 @@ def write_run(folder: Path, status: str, parameters: dict[str, Any]) -> None:
     write_json(folder / "run.json", {"status": status, "parameters": parameters})
 
 
-def test_a_damaged_run_is_not_kept(tmp_path: Path) -> None:
-    store, request = Store(tmp_path), ask(setup(2, 1.0), [100.0])
-    assert not computing.is_complete(request, store)
-    write_run(store.run_folder(request.setup), "converged", {"density": 3})
-    assert not computing.is_complete(request, store)
-
-
 # --- marks ----------------------------------------------------------------------------------------
 
 
@@ -205,38 +185,6 @@ def marked(tmp_path: Path) -> Store:
     for density, verdict in VERDICTS.items():
         write_state(store, setup(density, 1.0), 400.0, verdict)
     return store
-
-
-def test_a_profile_that_is_no_plain_result_is_dotted_or_absent(marked: Store) -> None:
-    product = ITEMS["fig10"].make(marked, Scope())
-    figure = Figure()
-    assert product.draw is not None
-    product.draw(figure)
-    lines = {str(line.get_label()): line.get_linestyle() for line in figure.axes[1].lines}
-    assert lines == {
-        "density 1": "-",
-        "density 2 (oscillating)": ":",
-        "density 4 (collapsed)": "None",
-        f"density 8 ({NOT_REACHED})": "None",
-    }
-    assert (
-        "oscillating: U +400 d 2; collapsed: U +400 d 4; not reached: U +400 d 8" in product.caption
-    )
-    verdicts = [row[-1] for row in product.tables["fig10_states"].rows]
-    assert verdicts == [*VERDICTS.values(), NOT_REACHED]
-    assert {row[0] for row in product.tables["fig10"].rows} == {"density 1", "density 2"}
-
-
-def test_a_point_that_is_no_plain_result_is_hollow_or_absent(marked: Store) -> None:
-    product = ITEMS["fig17"].make(marked, Scope())
-    figure = Figure()
-    assert product.draw is not None
-    product.draw(figure)
-    points = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
-    faces = {float(np.asarray(p.get_xdata())[0]): p.get_markerfacecolor() for p in points}
-    assert set(faces) == {1.0, 2.0}
-    assert faces[2.0] == "white" != faces[1.0]
-    assert [text.get_text() for text in figure.axes[0].texts] == ["o"]
 
 
 def test_statements_without_their_runs_are_not_decided(tmp_path: Path) -> None:
@@ -299,22 +247,6 @@ def test_a_ripple_is_what_rises_before_the_dip(sign: float, rise: float, tmp_pat
 
 
 # --- the page -------------------------------------------------------------------------------------
-
-TEMPLATE = (
-    "before\n<!-- table t: b, verdicts -->\nold\n<!-- end -->\n<!-- caption c -->\n<!-- end -->\n"
-)
-
-
-def test_the_page_takes_its_tables_from_files(tmp_path: Path) -> None:
-    write_csv(tmp_path / "t.csv", ("a", "b", "verdicts"), [[1.0, 0.123456, ".o"], [2.0, 3.0, "-"]])
-    (tmp_path / "c.txt").write_text("A caption.\n")
-    text = docs_tables.renewed(TEMPLATE, tmp_path)
-    assert "old" not in text
-    assert "| b | verdicts |\n|---|---|\n| 0.1235 | `.o` |\n| 3 | `-` |\n" in text
-    assert "\nA caption.\n" in text
-    assert docs_tables.renewed(text, tmp_path) == text
-    with pytest.raises(ValueError, match="no column 'z'; allowed: a, b, verdicts"):
-        docs_tables.renewed(TEMPLATE.replace("b,", "z,"), tmp_path)
 
 
 def test_bad_input_is_one_line() -> None:

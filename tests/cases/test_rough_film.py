@@ -113,22 +113,6 @@ def test_without_roughness_the_pages_are_the_smooth_ones() -> None:
     assert zero.layout == default.layout
 
 
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        ({"roughness": 0.2, "cavitation": "penalty"}, "leave cavitation out"),
-        ({"cavitation_pressure": -0.05, "cavitation": "penalty"}, "leave cavitation out"),
-        ({"roughness": 0.2, "reynolds": "dg"}, '"fe"'),
-        ({"roughness": [0.1, -0.2]}, "greater than or equal to 0"),
-        ({"boundary_friction": -0.1}, "greater than or equal to 0"),
-        ({"cavitation_pressure": 0.2}, "less than or equal to 0"),
-    ],
-)
-def test_what_does_not_fit_is_said(keys: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValidationError, match=words):
-        Seal.model_validate(keys)
-
-
 def test_a_smooth_run_says_where_usual_surfaces_would_touch() -> None:
     values: dict[str, Any] = {
         "sealed_pressure_MPa": 1.0,

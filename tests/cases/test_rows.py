@@ -5,12 +5,10 @@ from math import nan
 from typing import Literal
 
 import pytest
-from pydantic import ValidationError
 
 from softehl.cases.harness.case import Case
 from softehl.cases.harness.parameters import Nonzeros, Parameters, key, keys_of
 from softehl.cases.harness.row import OK, Row, column
-from softehl.cases.harness.table import column_lines, key_lines, rows_table
 from softehl.cases.seal.states.state import FilmRow
 from tests.cases.test_report import row as film_row
 
@@ -63,12 +61,6 @@ def test_key_names_and_order() -> None:
     assert (Fall.label(1.5), FilmRow.label(400.0)) == ("H = 1.5 m", "U = +400 mm/s")
 
 
-def test_the_table_on_the_terminal_shares_a_head() -> None:
-    table = rows_table(Falls(), [Fall(2.0, 0.0, nan, 3, OK), Fall(1.0, 0.25, 0.7, 3, "odd")])
-    assert [str(one.header) for one in table.columns] == ["H\nm", "time\ns", "verdict"]
-    assert [str(cell) for cell in table.columns[1].cells] == ["0.0", "0.2 +0.7"]
-
-
 def test_only_declared_fields_are_columns() -> None:
     """A state is a row with more; its columns are those of the row."""
     row = film_row(400.0, 1.3)
@@ -95,15 +87,3 @@ def test_bounds_come_from_limits_and_types() -> None:
         "name": "left out = none",
     }
     assert Stone.model_fields["mass"].description == "mass [kg]; > 0 and <= 5"
-
-
-@pytest.mark.parametrize("heights", [(), (1.0, 1), (0.0,), (True,), ("one",), (nan,)])
-def test_a_list_of_numbers_is_checked(heights: object) -> None:
-    with pytest.raises(ValidationError, match="heights"):
-        Stone.model_validate({"heights": heights})
-
-
-def test_tables_of_the_documentation() -> None:
-    assert "| `mass` | `1.0` | kg | > 0 and <= 5 | mass |" in key_lines(Stone)
-    assert "| `name` | - |  | left out = none | its name |" in key_lines(Stone)
-    assert "| `bounces` |  | how often it is thrown back &#124; or not |" in column_lines(Fall)

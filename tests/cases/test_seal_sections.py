@@ -25,14 +25,12 @@ from softehl.cases.seal.states.contacts import (
     CONTACT_FILM,
     contact_edges,
     contact_film,
-    contact_peaks,
     contact_pressure,
-    contacts,
     groups,
     overlap,
 )
 from softehl.cases.seal.states.results import filled_ratio, film_parts, metering, parted_fluxes
-from softehl.cases.seal.states.state import OSCILLATING, Outcome, Silent
+from softehl.cases.seal.states.state import Outcome, Silent
 from softehl.cases.seal.states.verdict import (
     ContactNumbers,
     FilmNumbers,
@@ -54,34 +52,6 @@ def _contact(**changes: Any) -> tuple[SealSystem, Array]:
 @cache
 def _curve(**changes: Any) -> Outcome:
     return run(Seal(**{"error_estimate": False, **changes}), Silent())
-
-
-@pytest.mark.parametrize(
-    ("changes", "reason"),
-    [
-        ({"section": "x_ring", "corner_radius": 0.4}, "corner_radius is no dimension of section ="),
-        ({"lobe_radius": 0.9}, 'section = "round": section_diameter alone'),
-        ({"section": "x_ring", "lobe_radius": 3.0}, "lobe_radius = 3 mm; at most half"),
-        ({"section": "u_cup"}, "at least the width of the section, 4.589 mm"),
-        ({"section": "d_ring", "extrusion_gap": 0.05}, 'extrusion_gap: for section = "round" only'),
-        (
-            {"section": "d_ring", "sensitivity": True, "cap_thickness": 1.4},
-            "not of an outline of a file",
-        ),
-        ({"section": "hat"}, "'round', 'rectangular', 'x_ring'"),
-        ({"outline": "nothing.dxf"}, "there is no such file"),
-    ],
-)
-def test_a_section_that_is_not_one(changes: dict[str, Any], reason: str) -> None:
-    with pytest.raises(ValueError, match=reason):
-        Seal(**changes)
-
-
-def test_a_width_that_is_given_is_that_of_the_section() -> None:
-    given: dict[str, Any] = {"section": "rectangular", "section_width": 3.0}
-    p = Seal(**given)
-    assert p.axial_width == pytest.approx(3.0, rel=1e-12)
-    assert p.free_section.outline.area == pytest.approx(3.0 * 3.53 - (4 - np.pi) * 0.4236**2)
 
 
 def test_sections_of_two_lobes_conserve_mass() -> None:
@@ -423,14 +393,6 @@ def test_without_pressure_the_mirror_image_of_a_state_is_one(section: str) -> No
 
 
 @pytest.mark.slow
-def test_lobes_of_an_x_ring_are_equal_without_pressure() -> None:
-    system, x = _contact(sealed_pressure=0.0, **X_RING)
-    assert len(contacts(system, x)) == 2
-    sealed, air = contact_peaks(system, 0.0, x)
-    assert sealed == pytest.approx(air, rel=5e-3)
-
-
-@pytest.mark.slow
 def test_an_x_ring_whose_lobes_are_one_circle_is_the_o_ring() -> None:
     """To 0.4 %, to 0.1 % at density 4: their meshes differ."""
     given: dict[str, Any] = {"stroke": "out", "speeds": (800.0, 100.0), "density": 2}
@@ -439,52 +401,6 @@ def test_an_x_ring_whose_lobes_are_one_circle_is_the_o_ring() -> None:
     for a, b in zip(circle.states, ring.states, strict=True):
         assert a.h_star_um == pytest.approx(b.h_star_um, rel=5e-3)
         assert a.verdict == b.verdict == OK
-
-
-def _documented() -> dict[str, list[float]]:
-    """Section -> the four films that docs/sections.md gives, um."""
-    text = (Path(__file__).parents[2] / "docs" / "sections.md").read_text(encoding="utf-8")
-    table = text.split("<!-- films of sections -->")[1].split("<!-- end -->")[0]
-    rows = [line.strip("| ").split("|") for line in table.strip().splitlines()[2:]]
-    return {row[0].strip(" `"): [float(cell) for cell in row[2:]] for row in rows}
-
-
-SIZES: dict[str, dict[str, Any]] = {
-    "rectangular": {"corner_radius": 0.4},
-    "x_ring": {"lobe_radius": 0.9, "fillet_radius": 0.6},
-    "u_cup": {"groove_width": 6.0},
-}
-
-
-def test_every_section_but_the_round_one_has_its_films_documented() -> None:
-    assert set(_documented()) == set(SECTIONS) - {"round"}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("section", [name for name in SECTIONS if name != "round"])
-def test_the_films_that_are_documented(section: str) -> None:
-    given = {**GROOVE, "section": section, **SIZES.get(section, {})}
-    found = _curve(stroke="out", speeds=(800.0, 50.0), **given)
-    assert [s.h_star_um for s in found.states] == pytest.approx(
-        _documented()[section][:2], rel=0.01
-    )
-    assert [s.verdict for s in found.states] == [OK, OK]
-
-
-@pytest.mark.slow
-def test_the_films_of_a_rectangle_and_of_an_x_ring() -> None:
-    """Against a study of its own code at density 2; um at 800 mm/s."""
-    flat = _curve(section="rectangular", corner_radius=0.4, speeds=(800.0,), **GROOVE)
-    assert [s.h_star_um for s in flat.states] == pytest.approx([1.087, 0.937], rel=0.01)
-    lobes = _curve(speeds=(800.0,), **X_RING)
-    assert [s.h_star_um for s in lobes.states] == pytest.approx([1.592, 1.268], rel=0.015)
-    for state in flat.states:
-        assert state.verdict == OK
-    for state in lobes.states:
-        assert state.verdict in (OK, OSCILLATING)  # beside the groove, at density 2
-        assert abs(state.flux_mismatch_percent) < 1e-6
-        assert state.contact_start_mm < state.groove_start_mm < state.groove_end_mm
-        assert min(state.h_min_sealed_um, state.h_min_air_um) == pytest.approx(state.h_min_um)
 
 
 def test_the_inlet_of_a_section_with_two_lobes_needs_more_segments() -> None:

@@ -18,7 +18,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.files import finer, outline_of, read_mesh, read_outline
 from softehl.cases.seal.gland.sections.keys import lobes
-from softehl.cases.seal.meshing.outline import Arc, Outline, Shape
+from softehl.cases.seal.meshing.outline import Arc, Shape
 from softehl.cases.seal.meshing.outline_mesh import outline_mesh
 from softehl.cases.seal.meshing.section_mesh import SectionMesh, corner_jacobians
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
@@ -88,15 +88,6 @@ def test_a_drawing_of_a_section_is_that_section(name: str, tmp_path: Path) -> No
     assert found.name == "seal"
     mirrored = read_outline(draw(drawn, tmp_path / "seal.dxf", mirror=-1.0))
     assert lobes(found) == lobes(mirrored) == lobes(drawn)  # also where the film passes the start
-
-
-@pytest.mark.parametrize("name", ["d_ring", "u_cup"])
-def test_units_direction_and_side_of_a_drawing_do_not_matter(name: str, tmp_path: Path) -> None:
-    drawn, path = DRAWN[name], tmp_path / "seal.dxf"
-    assert_same(read_outline(draw(drawn, path, unit=1)), drawn, 1e-9)
-    assert_same(read_outline(draw(drawn, path, unit=6)), drawn, 1e-9)
-    assert_same(read_outline(draw(drawn, path, mirror=-1.0)), drawn, 1e-9)
-    assert_same(read_outline(draw(drawn, path, swap=True)), drawn, 1e-9)
 
 
 def stadium(path: Path, change: Callable[[Any], None] | None = None) -> Path:
@@ -201,19 +192,6 @@ def test_points_make_a_section() -> None:
     assert free.outline.at(np.array(free.film)) == pytest.approx(np.array(BOX[:2]))
 
 
-def test_points_come_from_csv(tmp_path: Path) -> None:
-    path = tmp_path / "seal.csv"
-    rows = [f"{z},{r},{part}" for (z, r), part in zip(BOX, PARTS, strict=True)]
-    path.write_text("\n".join(["z_mm,r_mm,part", *rows]), encoding="utf-8")
-    assert read_outline(path).outline.area == pytest.approx(12.0)
-    path.write_text("z_mm,r_mm\n1,a\n", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"seal\.csv: a file of points has the columns z_mm, r_mm"):
-        read_outline(path)
-    path.write_text("z_mm,r_mm\n0,25\n2,27\n2,25\n0,27\n", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"seal.csv: the outline crosses .* at \(1, 26\)"):
-        read_outline(path)
-
-
 def test_a_film_away_from_the_rod_is_refused() -> None:
     with pytest.raises(ValueError, match="FILM does not hold the lowest point"):
         outline_of(BOX, 50.0, ["", "PRESSURE", "FILM", "FILM", ""])
@@ -289,18 +267,6 @@ def test_meshes_that_are_no_sections_are_refused(tmp_path: Path) -> None:
         read_mesh(tmp_path / "none.msh")
 
 
-def test_an_outline_of_many_points_has_a_mesh() -> None:
-    """A circle of 300 points: corners are none, and its mesh is as good as the circle's."""
-    angles = np.linspace(0.0, 2.0 * pi, 300, endpoint=False)
-    points = [(1.765 * sin(a), 26.96 - 1.765 * cos(a)) for a in angles]
-    shape = outline_of(points)
-    mesh = outline_mesh(shape, shape.film, None, 33, 1)
-    circle = Outline.circle((0.0, 26.96), 1.765)
-    assert len(mesh.boundary) < 100
-    assert shape.outline.area == pytest.approx(circle.area, rel=1e-3)
-    assert corner_jacobians(mesh).min() >= 0.3
-
-
 @pytest.mark.slow
 def test_an_o_ring_from_a_drawing_has_the_film_of_the_built_in_one(tmp_path: Path) -> None:
     """A drawn circle is a circle: it has the same mesh."""
@@ -351,23 +317,3 @@ def test_a_mesh_file_as_it_is_has_the_film_of_that_mesh(tmp_path: Path) -> None:
     assert found.verdict == expected.verdict == OK
     finer = Seal(**{**p.model_dump(), "density": 2})
     assert len(build_system(finer).mesh.quads) == 4 * len(build_system(p).mesh.quads)
-
-
-def test_a_mesh_as_it_is_needs_a_file(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r'give outline = "seal\.msh" too'):
-        Seal(mesh="file")
-    mesh, shape = meshed()
-    path = save(mesh, shape, tmp_path / "seal.msh")
-    given: dict[str, Any] = {"outline": str(path), "mesh": "file", "groove_width": 5.0}
-    p = Seal(**given)
-    assert p.regions == ("rubber",)
-    system = build_system(Seal(**{**p.model_dump(), "density": 1}))
-    assert np.array_equal(system.mesh.quads, read_mesh(path, p.inner_diameter)[1].quads)
-    own: dict[str, Any] = {"materials": {"rubber": {"material": "neo-hooke", "mu": 9.0}}}
-    hard = Seal(**given, **own)
-    assert hard.surface_modulus == 9.0
-    assert build_system(hard).solids == ("solid rubber",)
-    with pytest.raises(ValueError, match=r"materials\.cap: the section has rubber"):
-        Seal(**{**given, "materials": {"cap": "ptfe"}})
-    with pytest.raises(ValueError, match="has its own regions; leave it out"):
-        Seal(**given, cap_thickness=1.0)

@@ -12,17 +12,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from softehl.__main__ import main
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
-from softehl.cases.seal.gland.tolerances import ToleranceRow, band, read_tolerances
+from softehl.cases.seal.gland.tolerances import band, read_tolerances
 from softehl.cases.seal.gland.varied import LENGTHS
-from softehl.cases.seal.report.tables import SHOWN, read_slopes, told
-from softehl.cases.seal.report.tornado import tornado_figure
 from softehl.cases.seal.sensitivity.following import edges, shift_rate, shifted, velocities
 from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, Tangent
 from softehl.cases.seal.sensitivity.quantities import (
@@ -38,16 +35,16 @@ from softehl.cases.seal.sensitivity.sensitivity import (
     rates_of,
     sensitivities,
 )
-from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
+from softehl.cases.seal.sensitivity.variation import FilmCase
 from softehl.cases.seal.solve.films import Film
 from softehl.cases.seal.solve.method import DryContact, run
 from softehl.cases.seal.states.results import film_numbers, film_state
-from softehl.cases.seal.states.sensitivity_table import SensitivityRow, differentiable, resolved
+from softehl.cases.seal.states.sensitivity_table import SensitivityRow, resolved
 from softehl.cases.seal.states.state import FilmRow, Silent
 from softehl.cases.seal.states.verdict import Verdict
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.postprocessing import interval_below
-from softehl.runtime.io import read_csv, write_csv
+from softehl.runtime.io import read_csv
 from softehl.runtime.solve.linear.linear_solver import Factorisation, SparseMatrix
 from softehl.runtime.solve.linear.superlu import SuperLU
 from softehl.runtime.solve.newton import Newton
@@ -267,26 +264,6 @@ def test_edges_and_corners_hold_the_mesh() -> None:
         assert speed[at] == pytest.approx([float(k == other) for other in range(len(found))])
 
 
-def test_the_rates_of_one_speed_serve_another() -> None:
-    case, x = state("out")
-    slower = case.scaled(SPEED, -0.1)
-    y = solved(slower, x)
-    known, new = rates_of(slower, rates_of(case)), rates_of(slower)
-    one, other = (sensitivities(slower, y, SuperLU(), r) for r in (known, new))
-    for quantity in QUANTITIES:
-        assert one[quantity] == pytest.approx(other[quantity], rel=1e-9, abs=1e-9)
-
-
-def test_the_rates_of_one_stroke_serve_the_other() -> None:
-    case, _ = state("out")
-    inward = replace(case.film, stroke="in")
-    out, back = rates_of(case), rates_of(FilmCase(case.system, inward))
-    for key in set(out) - {SPEED}:
-        for name, rows in out[key].blocks.items():
-            assert rows == pytest.approx(back[key].blocks[name], rel=1e-9, abs=1e-9)
-    assert out[SPEED].blocks["film"] == pytest.approx(-back[SPEED].blocks["film"])
-
-
 def test_what_does_not_move_has_no_rate() -> None:
     """To the last bit: its kernels are not called."""
     case, _ = state("out")
@@ -337,15 +314,6 @@ def test_only_states_that_the_mesh_shows_are_differentiated() -> None:
     assert CASE.complaints(p, [row], [], "") == []
 
 
-def test_films_that_begin_before_their_arc_are_said_to_have_no_sensitivities() -> None:
-    row = FilmRow(**film_values(verdict="ok", inlet_ratio=0.997))
-    cut = replace(row, entrance_pressure_MPa=0.1)
-    assert differentiable(row)
-    assert not differentiable(cut)
-    (words,) = CASE.complaints(Seal(sensitivity=True), [row, cut], [], "")
-    assert "the film begins before its arc" in words
-
-
 # ------------------------------------------------------------------------------------- tolerances
 
 
@@ -366,30 +334,6 @@ def test_tolerances_of_a_catalogue_ring_and_given_ones() -> None:
     assert set(shares) == {"section_diameter", "inner_diameter", "viscosity", "modulus"}
 
 
-def test_the_modulus_is_that_of_the_rubber() -> None:
-    """A hardness gives a neo-Hookean one, whose modulus is mu."""
-    rubbers: list[tuple[dict[str, Any], tuple[str, ...]]]
-    rubbers = [({"shore_A": 70.0}, ("mu",)), ({"mu_2": 0.0}, ("mu_1",))]
-    for given, names in rubbers:
-        p = Seal(sensitivity=True, tolerances=("modulus 25 %",), **given)
-        shares = read_tolerances(p)
-        assert shares["modulus"] == dict.fromkeys(names, 0.25)
-
-
-def test_the_rod_is_its_diameter() -> None:
-    p = Seal(rod=50.0, sensitivity=True, tolerances=("rod 0.05 mm",))
-    shares = read_tolerances(p)
-    assert shares["rod"] == {"rod_diameter": pytest.approx(0.001)}
-
-
-def test_a_thicker_ring_of_a_piston_is_larger_outside() -> None:
-    """Its inside diameter has a tolerance of its own: 0.1 mm of section are 0.2 mm outside."""
-    p = Seal(ring="32x4", bore=40.0, sensitivity=True, tolerances=("section_diameter 0.1 mm",))
-    shares = read_tolerances(p)
-    moved = {key: share * getattr(p, key) for key, share in shares["section_diameter"].items()}
-    assert moved == pytest.approx({"section_diameter": 0.1, "inner_diameter": -0.2})
-
-
 def test_a_band_adds_up() -> None:
     shares = {"a": {"a": 0.01}, "both": {"b": 0.02, "c": 0.02}}
     row = band((1.0, 400.0), "friction", {"a": -3.0, "b": 1.0, "c": 1.0, "d": 9.0}, shares)
@@ -399,62 +343,7 @@ def test_a_band_adds_up() -> None:
     assert row.largest_percent == pytest.approx(4.0)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"tolerances": ["viscosity"]}, '"viscosity" is not understood'),
-        ({"tolerances": ["colour 3 %"]}, '"colour 3 %" is not understood'),
-        ({"tolerances": ["groove_centre 3 %"]}, "a number other than 0"),
-        ({"tolerances": [""]}, "is not understood"),
-        ({"tolerances": ["shore_A 7 %"], "shore_A": 70.0}, "shore_A 7 %.* is not understood"),
-        ({"tolerances": ["boundary_friction 20 %"]}, "is not understood"),
-        ({"tolerances": ["sealed_pressure 0.1 mm"]}, "is not understood"),
-        ({"tolerances": ["viscosity 3 %", "viscosity 5 %"]}, "viscosity is given twice"),
-        ({"tolerances": ["viscosity 3 %"], "sensitivity": False}, "need the sensitivities"),
-        ({"housing_friction": 0.1}, "depends on how it was reached"),
-    ],
-    ids=str,
-)
-def test_what_makes_no_sense_is_refused(given: dict[str, object], message: str) -> None:
-    with pytest.raises(ValidationError, match=message):
-        Seal(**{"sensitivity": True, **given})  # type: ignore[arg-type]
-
-
 # ----------------------------------------------------------------------------------- command line
-
-
-def test_a_run_tells_its_tolerances(tmp_path: Path) -> None:
-    """The largest three keys of each quantity, and the band; nothing without the files."""
-    assert told(Seal(), tmp_path) == []
-    slopes = {"rod_diameter": -40.0, "mu_1": 0.4, "viscosity": 0.5, "U": -0.01}
-    rows = [
-        (1.0, 200.0, quantity, name, slope)
-        for quantity in ("h_star", "friction", "leakage", "p_max")
-        for name, slope in slopes.items()
-    ]
-    write_csv(tmp_path / "sensitivity.csv", SensitivityRow.header(), rows)
-    band_row = (1.0, 200.0, "friction", 23.4, 17.6, "section_diameter", 16.9)
-    write_csv(tmp_path / "tolerances.csv", ToleranceRow.header(), [band_row])
-    most = "rod_diameter -40 %, viscosity +0.5 %, mu_1 +0.4 %"
-    assert told(Seal(), tmp_path) == [
-        "  +200 mm/s, likely changes by tolerances: friction 18 % (at worst 23 %, most of it "
-        "section_diameter)",
-        f"  +200 mm/s, for 1 % of a key: h*: {most}; friction: {most}; leakage: {most}",
-    ]
-
-
-def test_those_of_a_piston_seal_are_told_by_its_own_sizes(tmp_path: Path) -> None:
-    """What is negative inside has other names in files; picture and terminal say what is meant."""
-    p = Seal(bore=40, ring="32x4")
-    slopes = {"rod_diameter": 14.0, "housing_diameter": -9.9, "inner_diameter": -1.8}
-    rows = [(1.0, 400.0, quantity, *slope) for quantity in SHOWN for slope in slopes.items()]
-    write_csv(tmp_path / "sensitivity.csv", SensitivityRow.header(), rows)
-    (line,) = told(p, tmp_path)
-    most = "bore +14 %, groove_diameter -9.9 %, outside diameter of the ring -1.8 %"
-    assert f"h*: {most}; " in line
-    figure = tornado_figure("", read_slopes(p, tmp_path))
-    drawn = [label.get_text() for label in figure.axes[0].get_yticklabels()]
-    assert drawn == ["outside diameter of the ring", "groove diameter", "bore"]
 
 
 @pytest.mark.slow
@@ -476,18 +365,6 @@ def test_a_run_writes_its_sensitivities(tmp_path: Path) -> None:
     assert (out / "tornado.png").stat().st_size > 10_000
     assert "viscosity" in (out / "tolerances.csv").read_text()
     assert np.isfinite([r.log_derivative for r in rows]).all()
-
-
-@pytest.mark.slow
-def test_an_unresolved_mesh_is_refused_with_a_sentence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Uniform and coarse: the sign of dh*/dp_s would be wrong at instroke."""
-    settings = ["stroke=in", "speeds=[100]", "mesh=uniform", "density=2"]
-    given = [a for s in settings for a in ("--set", s)]
-    assert main(["run", "oring", "--sensitivity", "--out", str(tmp_path), *given]) == 3
-    assert "no sensitivities of U = -100 mm/s" in capsys.readouterr().err
-    assert not (tmp_path / "sensitivity.csv").exists()
 
 
 HEADER = ("sealed_pressure_MPa", "rod_speed_mm_s", "quantity", "parameter", "log_derivative")

@@ -15,7 +15,6 @@ from scipy.optimize import brentq
 
 import softehl
 from softehl.cases.harness.observer import State
-from softehl.cases.harness.parameters import Parameters
 from softehl.cases.slider.case import CASE, Slider, SliderRow
 from softehl.runtime.arrays import Array
 from tests.reference import slider as reference
@@ -151,15 +150,6 @@ def test_the_cosine_by_quadrature_and_by_sommerfeld(speed: float) -> None:
     assert thicker.error(found[-1]) > 5e-3
 
 
-def test_two_closed_forms_agree_with_quadrature() -> None:
-    for p, form in ((WEDGE, wedge), (EXPONENTIAL, exponential)):
-        independent = by_quadrature(p, p.gap, 400.0)
-        exact = form(p, 400.0)
-        assert independent.flux == pytest.approx(exact.flux, rel=1e-9)
-        assert independent.load == pytest.approx(exact.load, rel=1e-9)
-        assert independent.friction == pytest.approx(exact.friction, rel=1e-9)
-
-
 def test_barus_law() -> None:
     """The reduced pressure is that of a constant viscosity."""
     alpha = 0.4
@@ -230,17 +220,6 @@ def test_a_film_without_pressure_has_no_load_and_is_torn_where_its_gap_widens() 
     assert widening.rupture_mm == pytest.approx(-1.5, abs=0.01)
 
 
-def test_both_ways_are_mirror_images() -> None:
-    there = Slider()
-    back = there.model_copy(update={"start": -there.end, "end": -there.start})
-    one, other = row(there), row(back, -400.0)
-    assert other.load_N_per_mm == pytest.approx(one.load_N_per_mm, rel=1e-9)
-    assert other.flux_mm2_s == pytest.approx(-one.flux_mm2_s, rel=1e-9)
-    assert other.friction_N_per_mm == pytest.approx(-one.friction_N_per_mm, rel=1e-9)
-    assert other.rupture_mm == pytest.approx(-one.rupture_mm, rel=1e-7)
-    assert one.rupture_mm > 0.06
-
-
 @pytest.mark.parametrize("p", [WEDGE, EXPONENTIAL, Slider(), Slider(profile="cosine")])
 def test_ok_is_within_two_per_cent(p: Slider) -> None:
     fine = row(p.model_copy(update={"segments": 3000}))
@@ -284,40 +263,6 @@ def test_a_run_and_what_it_writes(tmp_path: Path) -> None:
     assert all(stage["steps"] for stage in content["stages"])
 
 
-def test_resume_and_jobs(tmp_path: Path) -> None:
-    few, more = ("--set", "speeds=[100, 200]"), ("--set", "speeds=[100, 200, 50, -50]")
-    assert run(tmp_path / "a", *few) == 0
-    before = curve(tmp_path / "a")
-    assert run(tmp_path / "a", *more, "--resume", "--jobs", "2") == 0
-    after = curve(tmp_path / "a")
-    assert [line[0] for line in after] == ["200", "100", "50", "-50"]
-    assert after[:2] == before
-
-
-@pytest.mark.parametrize(
-    ("assignment", "words"),
-    [
-        ("profile=wegde", '"wedge", "parabola", "cosine", "exponential" or "pocket"'),
-        ("h0=0", "h0 = 0"),
-        ("start=2", "start = 2 must be less than end = 0.75"),
-        ("speeds=[0]", "a number is 0; allowed: speeds U"),
-        ("speeds=[1, 1.0]", "a number is given twice"),
-        ("speeds=true", "a number or a list of different ones"),
-        ("amplitude=1", "> -1 and < 1"),
-        ("segments=2", ">= 4"),
-        ("h_0=1", "did you mean 'h0'"),
-        ("tolerance=1", "unknown key 'tolerance'"),
-    ],
-)
-def test_bad_values(
-    assignment: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(tmp_path / "a", "--set", assignment) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert words in line
-    assert not (tmp_path / "a").exists()
-
-
 def test_a_film_that_no_pressure_carries(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -327,25 +272,3 @@ def test_a_film_that_no_pressure_carries(
     assert "U = +400 mm/s: no pressure carries this film" in line
     assert "reached and saved" in line
     assert [row[0] for row in curve(tmp_path / "a")] == ["20"]
-
-
-def test_keys(capsys: pytest.CaptureFixture[str]) -> None:
-    assert softehl.main(["keys", "slider"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    for name in Slider.model_fields:
-        assert sum(line.startswith(f" {name} ") for line in lines) == 1
-    assert any("viscosity" in line and "MPa s" in line and "> 0" in line for line in lines)
-
-
-def test_a_sweep_of_two_cases(tmp_path: Path) -> None:
-    cases = {"a": Slider(speeds=(100.0,)), "b": WEDGE}
-    curves = softehl.solve_cases(cases, tmp_path)
-    assert [len(one.rows) for one in curves] == [1, 3]
-    assert all(one.converged for one in curves)
-    with pytest.raises(TypeError, match="not the parameter class of a case"):
-        softehl.solve_cases({"a": Parameters()}, tmp_path)
-
-
-def test_the_case_is_one_short_file() -> None:
-    source = Path(softehl.__file__).parents[2] / "cases" / "slider" / "case.py"
-    assert len(source.read_text(encoding="utf-8").splitlines()) < 150

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from scipy.optimize import brentq
 
-import softehl
 from softehl.cases.harness.observer import State
 from softehl.cases.slider.case import CASE, Slider, SliderRow
-from softehl.runtime.io import read_table
 from tests.reference import mixed
 from tests.reference.calling import fitted_order
 from tests.reference.differentiate import mpf
@@ -88,15 +84,6 @@ def test_the_parabola_ruptures_and_forms_again(pressure: float) -> None:
     assert math.isnan(penalty.reformation_mm)
     wrong = parabola_exact(p.model_copy(update={"viscosity": 1.05 * p.viscosity}))
     assert abs(found[-1].reformation_mm - wrong[2]) > 1e-3
-
-
-def test_both_directions_are_the_same_film() -> None:
-    p = PARABOLA.model_copy(update={"segments": 64})
-    one = row(p.model_copy(update={"end_pressure": 0.3}))
-    other = row(p.model_copy(update={"start_pressure": 0.3}), -SPEED)
-    assert other.flux_mm2_s == pytest.approx(-one.flux_mm2_s, rel=1e-9)
-    assert other.rupture_mm == pytest.approx(-one.rupture_mm, rel=1e-8)
-    assert other.reformation_mm == pytest.approx(-one.reformation_mm, rel=1e-8)
 
 
 def test_a_starved_parabola_fills_where_its_supply_does() -> None:
@@ -278,33 +265,3 @@ def test_little_roughness_is_the_smooth_film() -> None:
 
 
 # --- as a stranger would --------------------------------------------------------------------------
-
-
-def test_the_table_leaves_fronts_empty_that_are_not_there(tmp_path: Path) -> None:
-    settings = [f"--set={s}" for s in ("profile=wedge", "cavitation=mass-conserving", "segments=8")]
-    assert softehl.main(["run", "slider", *settings, "--out", str(tmp_path / "w"), "--quiet"]) == 0
-    header, *lines = (tmp_path / "w" / "curve.csv").read_text().splitlines()
-    for line in lines:
-        cells = dict(zip(header.split(","), line.split(","), strict=True))
-        assert cells["rupture_mm"] == cells["reformation_mm"] == ""
-    profile = read_table(next((tmp_path / "w").glob("profile_*.csv")))
-    assert {"x_mm", "p_MPa", "h_um", "h_T_um", "void_fraction"} <= set(profile)
-
-
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        ({"cavitation": "penalty", "supply": 0.001}, "leave cavitation out"),
-        ({"cavitation": "mass-conserving", "reynolds": "dg"}, '"fe"'),
-        ({"profile": "pocket", "pocket_start": -2.0}, "pocket_start and pocket_end"),
-        ({"roughness": -0.1}, "greater than or equal to 0"),
-        ({"cavitation_pressure": -1.0}, "-0.1"),
-    ],
-)
-def test_what_does_not_fit_is_said(keys: dict[str, object], words: str) -> None:
-    with pytest.raises(ValidationError, match=words):
-        Slider.model_validate(keys)
-
-
-def test_a_single_roughness_is_that_of_the_profile() -> None:
-    assert Slider.model_validate({"roughness": 0.3}).roughness == (0.0, 0.3)

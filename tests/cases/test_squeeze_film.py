@@ -84,15 +84,6 @@ def test_they_bear_the_section(begun: tuple[Relaxed, Array], dry: DryContact) ->
     assert half == pytest.approx(0.5 * without, rel=0.05)
 
 
-def test_what_holds_no_length_of_the_rod_has_no_pressure_of_its_own(dry: DryContact) -> None:
-    """A node between two segments on a wall: its force is on no area of the rod."""
-    system, upright = dry.system, dry.x.copy()
-    nodes = system.mesh.arc_nodes[-3:]
-    z = system.deformed(upright)[nodes, 0]
-    system.displacements(upright)[nodes, 0] += z[0] - z
-    assert np.isfinite(pressed_film(system, upright, 3.0)).all()
-
-
 @pytest.mark.parametrize("viscosity", [P.viscosity, 1e-11], ids=["usual", "thin"])
 def test_the_first_step_holds_the_film_where_it_is(
     dry: DryContact, squeeze_film: SqueezeFilm, viscosity: float
@@ -109,14 +100,6 @@ def test_the_first_step_holds_the_film_where_it_is(
     assert 0.0 < begun.change(start, found.x) < 0.7
     longer = steps.solve(begun.step(start, 1e5 * first, 0.0), start)
     assert not longer.converged or begun.change(start, longer.x) > 0.7
-
-
-def test_a_rod_that_nothing_touches_has_no_film(dry: DryContact) -> None:
-    nothing = replace(dry, x=dry.system.at_rest())
-    found = nothing.film("out", 400.0)
-    assert isinstance(found, NoFilm)
-    assert found.begun is None
-    assert "too few nodes touch the rod" in found.message
 
 
 # ------------------------------------------------------------------------------- masses and steps
@@ -194,11 +177,3 @@ def test_a_change_is_that_of_the_logarithm_of_the_gap(
     assert squeeze_film.change(dry.x, x) == pytest.approx(np.log(2.0), rel=1e-6)
     system.displacements(x)[node, 1] -= 2.0 * ratio * h[5]
     assert squeeze_film.change(dry.x, x) == np.inf
-
-
-def test_scales_are_those_of_the_speed(dry: DryContact, squeeze_film: SqueezeFilm) -> None:
-    slower = squeeze_film.at(100.0)
-    own = dry.film("out", 100.0)
-    assert not isinstance(own, NoFilm)
-    assert slower.scales.time == pytest.approx(own.squeeze_film.scales.time, rel=1e-12)
-    assert slower.scales.thickness == pytest.approx(own.squeeze_film.scales.thickness, rel=1e-12)

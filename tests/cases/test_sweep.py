@@ -5,12 +5,10 @@ import itertools
 import json
 import math
 import os
-import re
 import signal
 import subprocess
 import sys
 import time
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,14 +18,12 @@ import pytest
 from scipy.stats import kstest, norm, uniform
 
 import softehl
-from softehl.cases.harness import sampling
 from softehl.cases.harness.case import load_case
-from softehl.cases.harness.case_file import WAYS
-from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.study_file import Study, read_study
 from softehl.cases.seal.gland.tolerances import band
 from softehl.cases.shipped import SHIPPED
 from softehl.cases.slider import case as slider
+from tests.cases.test_refused import REFUSED
 
 GRID = """
 case = "slider"
@@ -162,59 +158,12 @@ def test_keys_that_move_together(tmp_path: Path) -> None:
         assert p["mu_1"] / default.mu_1 == pytest.approx(p["mu_2"] / default.mu_2, rel=1e-14)
 
 
-def test_the_studies_of_the_documentation(tmp_path: Path) -> None:
-    page = Path("docs/many-curves.md").read_text(encoding="utf-8").split("## From a script")[0]
-    lines = [line[4:] for line in page.splitlines() if line.startswith("    ") or not line]
-    text = "\n".join(line for line in lines if not line.startswith(("softehl", "mpiexec")))
-    head, *ways = re.split(r"^(?=\[)", text, flags=re.MULTILINE)
-    counts = {way.split("]")[0]: len(study(tmp_path / "s.toml", head + way).runs) for way in ways}
-    assert counts == {"[grid": 8, "[[list": 1, "[latin_hypercube": 50, "[random": 500}
-
-
 # --- bad input ------------------------------------------------------------------------------------
 
 HEAD = 'case = "slider"\n'
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("[grid]\nh0 = [1]", "no case"),
-        ('case = "slidr"\n[grid]\nh0 = [1]', 'case = "slidr"; allowed'),
-        (HEAD, "no points; allowed: one of [grid], [[list]]"),
-        (HEAD + "[grid]\n[[list]]\nh0 = 1", "grid and list; allowed: one of"),
-        (HEAD + "[grid]\n", "[grid] is empty"),
-        (HEAD + "[grid]\nh0 = []", "[grid] h0 = []: allowed: a list of values"),
-        (HEAD + "[grid]\nh = [1]", "unknown key 'h' (did you mean 'h0'?)"),
-        (HEAD + "speed = [1]\n[grid]\nh0 = [1]", "unknown key 'speed'"),
-        (HEAD + "h0 = 1\n[grid]\nh0 = [1]", "h0 is fixed and varied"),
-        (HEAD + "[grid]\nh0 = [1, -1]", "h0 = -1: "),
-        (HEAD + '[grid]\nh0 = ["1 bar"]', "is not a number in mm"),
-        (HEAD + "[grid]\nh0 = {from = 1, to = 2}", "count is missing"),
-        (HEAD + "[grid]\nh0 = {from = 2, to = 1, count = 3}", "from 2 to 1; allowed: the smaller"),
-        (HEAD + "[grid]\nh0 = {from = 1, to = 2, count = 3, scale = 1}", "unknown 'scale'"),
-        (HEAD + '[grid]\nstart = {from = -1, to = 0, count = 2, spacing = "log"}', "no logarithm"),
-        (HEAD + "[grid]\nh0 = {from = 1, to = 2, count = 1000}\n"
-         "ratio = {from = 1, to = 2, count = 1000}", "1000000 combinations"),
-        (HEAD + "[[list]]\n", "[[list]] is empty"),
-        (HEAD + "[latin_hypercube]\ncount = 2", "between is missing"),
-        (HEAD + "[latin_hypercube]\ncount = 0\nbetween.h0 = [1, 2]", "count = 0"),
-        (HEAD + "[latin_hypercube]\ncount = 2\nbetween.h0 = [2, 1]", "the smaller one first"),
-        (HEAD + "[latin_hypercube]\ncount = 2\nbetween.h0 = 2", "allowed: [least, largest]"),
-        (HEAD + "[latin_hypercube]\nnumber = 2\nbetween.h0 = [1, 2]", "unknown 'number'"),
-        (HEAD + '[random]\ncount = 2\ntolerances.h0 = "ten"', "allowed: a share"),
-        (HEAD + '[random]\ncount = 2\ntolerances.profile = "5 %"', 'profile = \'parabola\''),
-        (
-            'case = "oring"\n[random]\ncount = 2\ntolerances.rod = "0.05 mm"',
-            "rod = None; allowed: a key with a number that is not 0, as rod_diameter has",
-        ),
-        (HEAD + '[random]\ncount = 2\ntolerances.start_pressure = "5 %"', "number that is not 0"),
-        (HEAD + '[random]\ncount = 2\ntolerances."h0, ratio" = 0.1', "allowed: a share"),
-        (HEAD + '[random]\ncount = 2\ntolerances.h0 = "5 %"\ntolerances."h0, ratio" = "5 %"',
-         "given twice"),
-        (HEAD + "end = -2\n[grid]\nh0 = [0.001]", "start = -1.5 must be less than end = -2"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "words"), REFUSED["sweep"])
 def test_bad_input_is_one_line(
     text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -223,21 +172,6 @@ def test_bad_input_is_one_line(
     assert words in error
     assert len(error.splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["s.toml"]
-
-
-def test_what_a_stranger_types(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for given, words in (("oring", "a study is a TOML file"), ("no.toml", "no file 'no.toml'")):
-        assert softehl.main(["sweep", given]) == 2
-        assert words in capsys.readouterr().err
-    assert swept(tmp_path / "s.toml", GRID, "--set", "h0=0.1") == 2
-    assert "--set: h0 is fixed and varied" in capsys.readouterr().err
-    assert swept(tmp_path / "s.toml", GRID, "--jobs", "2", "--mpi") == 2
-    assert "exclude one another" in capsys.readouterr().err
-
-
-def test_no_key_is_called_as_a_way_of_varying() -> None:
-    for module in SHIPPED.values():
-        assert not set(load_case(module).parameters.model_fields) & {*WAYS, "case"}
 
 
 # --- runs -----------------------------------------------------------------------------------------
@@ -268,13 +202,6 @@ def test_a_sweep_is_its_runs(reference: Path) -> None:
     content = json.loads((reference / "run.json").read_text())
     assert (content["status"], content["counts"]) == ("done", {"converged": 6})
     assert content["fixed"] == {"speeds": [400, 200], "segments": 40}
-
-
-def test_a_sweep_is_reported_alone(reference: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert softehl.main(["report", str(reference), str(reference)]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert "holds a sweep; allowed: one sweep alone, or runs" in error
 
 
 def test_a_folder_with_a_sweep(
@@ -335,11 +262,6 @@ def test_runs_that_cannot_be_and_runs_that_fail(
     monkeypatch.undo()
     assert swept(tmp_path / "s.toml", text, "--resume") == 3
     assert [row["status"] for row in table(tmp_path / "s")][2:] == ["converged"] * 2
-
-
-def test_two_processes_give_the_same_table(reference: Path, tmp_path: Path) -> None:
-    assert swept(tmp_path / "s.toml", GRID, "--jobs", "2") == 0
-    same_tables(tmp_path / "s", reference)
 
 
 def test_dask_gives_the_same_table(
@@ -464,10 +386,3 @@ def test_a_tolerance_band_is_that_of_the_runs(tmp_path: Path) -> None:
         assert of_runs == pytest.approx(likely, rel=0.04), quantity
         fewer = {name: share for name, share in SHARES.items() if name != "viscosity"}
         assert band((1.0, 400.0), quantity, slopes, fewer).likely_percent < 0.95 * of_runs
-
-
-def test_points_are_few_enough() -> None:
-    with pytest.raises(BadInput, match="at most"):
-        sampling.grid_points({"a": [1.0] * 400, "b": [1.0] * 400}, lambda _, value: value)
-    points = sampling.grid_points({"a": [1.0] * 3, "b": [1.0] * 2}, lambda _, value: value)
-    assert Counter(map(str, points)) == {"{'a': 1.0, 'b': 1.0}": 6}

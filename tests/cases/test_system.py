@@ -1,8 +1,6 @@
 """The coupled system: declared once, counts of Table 2, loads, tangent of the whole."""
 
-import ast
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -39,16 +37,6 @@ def test_discontinuous_pressures_have_all_their_unknowns(m_p: int) -> None:
     assert np.array_equal(facet.dofs[:, :4], film.dofs[:-1, :4])
     assert np.array_equal(facet.dofs[:, 2:6], film.dofs[1:, :4])
     assert np.array_equal(facet.dofs[:, 6:], np.hstack([film.dofs[:-1, 4:], film.dofs[1:, 4:]]))
-
-
-@pytest.mark.parametrize("m_p", range(1, 6))
-def test_every_pressure_order_has_its_unknowns(m_p: int) -> None:
-    system = build_system(oring(density=1, pressure_order=m_p))
-    assert system.pressure_count == 27 * m_p + 1
-    film = system.problem.assembler.block("film")
-    assert film.dofs.shape == (27, 4 + m_p + 1)
-    ends = system.layout.dofs("pressure")[[0, -1]]
-    assert [film.dofs[0, 4], film.dofs[-1, -1]] == ends.tolist() == system.film_ends.tolist()
 
 
 def test_sealed_pressure_acts_from_the_sealed_end_of_the_arc_to_the_crown() -> None:
@@ -168,60 +156,6 @@ def test_a_pressure_is_rounded_to_far_less_than_the_tolerance() -> None:
 
 
 # --- declared once --------------------------------------------------------------------------------
-
-CASES = Path(__file__).parents[2] / "cases"
-DECLARATIONS = (CASES / "seal" / "equations" / "system.py", CASES / "slider" / "case.py")
-"""The system of a seal, and the slider, which has one of its own."""
-ASKED = ("part", "dofs", "count", "rows", "columns", "block", "fields", "pressures")
-"""Methods that take the name of a field or of a block."""
-
-
-def spelled(source: str) -> list[str]:
-    """Names of fields and blocks that a file spells, and columns of dof maps that it counts."""
-    found = []
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-            first = node.args[0] if node.args else None
-            literal = isinstance(first, ast.Constant | ast.JoinedStr)
-            if node.func.attr in ASKED and literal:
-                found.append(ast.unparse(node))
-        elif isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Tuple):
-            name = ast.unparse(node.value).rpartition(".")[2]
-            if name in ("dofs", "rows"):
-                found.append(ast.unparse(node))
-    return found
-
-
-def test_fields_and_blocks_are_named_in_one_file() -> None:
-    for path in CASES.rglob("*.py"):
-        if path not in DECLARATIONS:
-            assert spelled(path.read_text(encoding="utf-8")) == [], path
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        'x[system.layout.part("pressure")]',
-        "part = layout.dofs('rod')",
-        'assembler.block(f"{name}_film")',
-        "pressures = block.dofs[:, 4:]",
-        "dofs[:, columns:] += 3",
-    ],
-)
-def test_a_name_that_is_spelled_elsewhere_is_seen(source: str) -> None:
-    assert len(spelled(source)) == 1
-
-
-@pytest.mark.parametrize("reynolds", ["fe", "dg"])
-def test_columns_of_the_film_s_dof_maps(reynolds: str) -> None:
-    system = build_system(oring(density=1, pressure_order=3, reynolds=reynolds))
-    film = system.problem.assembler.block("film").dofs
-    assert np.array_equal(film[:, 4:], system.pressure_dofs())
-    assert film[:, :4].max() < 2 * len(system.mesh.points)
-    x = system.at_rest()
-    system.pressures(x)[:] = np.arange(system.pressure_count)
-    assert x[system.film_ends].tolist() == [0.0, system.pressure_count - 1.0]
-    assert np.flatnonzero(x).min() == system.film_ends[0] + 1
 
 
 def test_a_kernel_that_asks_for_what_nobody_gives_is_named() -> None:

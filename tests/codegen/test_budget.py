@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 
 import pytest
 
 from softehl.codegen import pipeline
 from softehl.codegen.emit.code_motion import Schedule, schedule
 from softehl.codegen.emit.liveness import peak_live
-from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.graph import Node
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import build, output_files
 from tests.codegen.budget import LARGEST_FILE, REMEDY, excess, published, shipped
-from tests.codegen.workshop import unknowns
 
 
 def test_no_cost_rose() -> None:
@@ -57,57 +55,6 @@ def intervals(plan: Schedule) -> int:
 
 def of(*roots: Node) -> int:
     return peak_live(schedule(roots))
-
-
-def test_a_product_of_sums_holds_two() -> None:
-    g = Graph()
-    a, b, c, d = unknowns(g, 4)
-    assert of(g.mul(g.add(a, b), g.add(c, d))) == 2
-    assert of(g.add(a, b)) == 1
-    assert of(a) == 0
-
-
-def test_a_chain_holds_one_and_a_tree_its_depth() -> None:
-    g = Graph()
-    x = unknowns(g, 16)
-    chain = x[0]
-    for y in x[1:]:
-        chain = g.mul(g.add(chain, y), y)
-    assert of(chain) == 1
-    level: Sequence[Node] = x
-    while len(level) > 1:
-        level = [g.mul(a, b) for a, b in zip(level[::2], level[1::2], strict=True)]
-    assert of(level[0]) == 4, "Sethi-Ullman number of a balanced tree with 16 leaves"
-
-
-def test_outputs_are_stored_at_once() -> None:
-    g = Graph()
-    x = unknowns(g, 8)
-    assert of(*(g.call(Op.EXP, y) for y in x)) == 1
-
-
-def test_the_two_sides_of_a_branch_are_never_live_together() -> None:
-    g = Graph()
-    x, y, z, w = unknowns(g, 4)
-    condition = g.compare(Op.LT, x, y)
-    side = g.mul(g.add(x, y), g.add(z, w))
-    other = g.mul(g.sub(x, y), g.sub(z, w))
-    # two inside either side; the condition is read before
-    assert of(g.branch(condition, side, other)) == 2
-    # exp is needed before and after: it waits through both sides
-    waiting = g.call(Op.EXP, x)
-    chosen = g.branch(g.compare(Op.LT, waiting, y), side, other)
-    assert of(g.mul(chosen, waiting)) == 3
-
-
-def test_sums_and_what_every_turn_reads_live_through_a_loop() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    xi = g.input("rule", 0, varying=True)
-    fixed = [g.call(Op.EXP, x), g.call(Op.EXP, y)]
-    body = [g.mul(f, xi) for f in fixed]
-    # two fixed values, two sums, and the bodies: both are added at the end of a turn
-    assert of(*(g.sum(b) for b in body)) == 6
 
 
 @pytest.mark.parametrize("name", ["axial_spring", "solid_q4"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import stat
 import subprocess
 import sys
 import time
@@ -173,14 +172,6 @@ def test_what_is_damaged_is_built_anew(damage: str) -> None:
     assert (folder / LIBRARY).stat().st_size > 1000
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"files": {}}', '{"content": "0", "files": {}}'])
-def test_a_damaged_record_of_derived_files_is_not_believed(place: Path, text: str) -> None:
-    cache_store.remember("key", {"a.c": "int a;\n"})
-    assert cache_store.recall("key") == {"a.c": "int a;\n"}
-    (place / "cache" / "derived" / "key.json").write_text(text)
-    assert cache_store.recall("key") is None
-
-
 @pytest.fixture
 def no_fallback() -> Iterator[None]:
     cache_dir._fallback.cache_clear()
@@ -218,37 +209,6 @@ def test_a_cache_that_others_may_write_to_is_not_used(place: Path, inside: str) 
         assert not found.is_relative_to(place)
     (place / "cache" / inside).chmod(0o755)
     assert kernel_cache.folder_of(Path("spring.py")) == usual
-
-
-def test_a_cache_of_somebody_else_is_not_used(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    kernel_cache.folder_of(Path("spring.py"))
-    owner = os.geteuid()
-    monkeypatch.setattr(os, "geteuid", lambda: owner + 1)
-    with pytest.raises(cache_dir.CacheError, match=f"belongs to another user, number {owner}; set"):
-        cache_dir.writable()
-
-
-def test_the_place_of_the_cache(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert cache_dir.wanted() == place / "cache"
-    monkeypatch.delenv("SOFTEHL_CACHE")
-    monkeypatch.setenv("HOME", str(place))
-    monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(place / "xdg"))
-    assert cache_dir.wanted() == place / "xdg" / "softehl"
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    assert cache_dir.wanted() == place / ".cache" / "softehl"
-    monkeypatch.setattr(sys, "platform", "darwin")
-    assert cache_dir.wanted() == place / "Library" / "Caches" / "softehl"
-
-
-def test_files_have_the_usual_permissions(place: Path) -> None:
-    folder = kernel_cache.folder_of(Path("spring.py"))
-    (place / "plain").write_text("")
-    usual = stat.S_IMODE((place / "plain").stat().st_mode)
-    records = list((place / "cache" / "derived").iterdir())
-    assert records
-    for path in (*records, folder / "spring.c"):
-        assert stat.S_IMODE(path.stat().st_mode) == usual
 
 
 def test_what_pages_of_fields_share_is_compiled_once_and_again_where_it_is_damaged(

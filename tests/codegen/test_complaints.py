@@ -14,7 +14,7 @@ import pytest
 
 import softehl
 from softehl.codegen.tools import build, cache_store, cli
-from softehl.runtime.kernels.kernel import MissingKernelsError, StaleKernelsError
+from softehl.runtime.kernels.kernel import StaleKernelsError
 
 MODEL = build.GENERATED.parent / "tests" / "codegen" / "pages" / "penalty_spring.py"
 NO_SYMPY = """
@@ -133,33 +133,11 @@ def test_a_name_that_is_not_utf8(capsys: pytest.CaptureFixture[str]) -> None:
     assert "is not UTF-8: rename it" in refused(capsys, name)
 
 
-@pytest.mark.parametrize("words", [["mine.py"], ["mine.py", "--target", "ufcx", "--out", "a"]])
-def test_a_model_whose_name_no_file_can_have(
-    words: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    long = "a" * 500
-    text = Path("mine.py").read_text().replace('Model("', f'Model("{long}')
-    Path("mine.py").write_text(text)
-    said = refused(capsys, *words)
-    assert "mine.py:" in said
-    assert "of a model has 5" in said
-    assert said.endswith("letters, allowed are 200\n")
-
-
 def test_a_model_without_a_rule(capsys: pytest.CaptureFixture[str]) -> None:
     text = Path("mine.py").read_text()
     assert ", rule=quadrature.point_rule()" in text
     Path("mine.py").write_text(text.replace(", rule=quadrature.point_rule()", ""))
     assert "has no rule: give rule=quadrature.gauss(2, 2), say, or" in refused(capsys, "mine.py")
-
-
-def test_a_file_whose_name_is_too_long(capsys: pytest.CaptureFixture[str]) -> None:
-    long = "a" * 500
-    assert len(refused(capsys, f"{long}.py")) < 200
-    assert softehl.main(["report", long]) == 2
-    assert "holds no run" in capsys.readouterr().err
-    with pytest.raises(MissingKernelsError, match="no kernel 'aaa"):
-        softehl.load_kernel(long)
 
 
 @pytest.mark.parametrize("words", ["kernels >&-", "keys oring >&-", "--help >&- 2>&-"])
@@ -171,14 +149,6 @@ def test_streams_that_are_closed_are_no_matter(words: str, monkeypatch: pytest.M
 
 
 # ----------------------------------------------------------------------- damage of a user's folder
-
-
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"kernels": []}', '{"kernels": {"it": 1}}'])
-def test_a_damaged_manifest_is_named(text: str) -> None:
-    assert softehl.main(["generate", "mine.py", "--out", "out"]) == 0
-    Path("out/manifest.json").write_text(text)
-    with pytest.raises(StaleKernelsError, match=r"manifest.json is damaged: run `softehl gen"):
-        softehl.load_kernel("out")
 
 
 def test_an_edited_manifest_is_named() -> None:

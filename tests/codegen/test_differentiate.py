@@ -18,14 +18,11 @@ from softehl.codegen.derive import task_outputs
 from softehl.codegen.derive.multilevel_chain_rule import Linearisation
 from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.differentiation import gradient
-from softehl.codegen.graph.evaluation import State, Walk, evaluate
+from softehl.codegen.graph.evaluation import State, evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.partial_derivatives import DifferentiationError, partials
-from softehl.codegen.graph.traversal import operations
+from softehl.codegen.graph.partial_derivatives import DifferentiationError
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
-from softehl.codegen.models import ALL
 from softehl.codegen.verify.graph_oracle import Oracle
 from tests.codegen.workshop import (
     close,
@@ -34,9 +31,7 @@ from tests.codegen.workshop import (
     linearised,
     same_value,
     unknowns,
-    value,
 )
-from tests.shipped import ENERGIES
 
 AT = inputs("1.3", "0.7", "2.9")
 
@@ -213,62 +208,6 @@ def test_random_graphs(derivative: Derivative, steps: list[Step], at: tuple[int,
 # --------------------------------------------------------------------------------------- branches
 
 
-@BOTH
-@pytest.mark.parametrize(
-    "undefined", [Op.LOG, Op.RECIP, Op.SQRT], ids=["logarithm", "quotient", "root"]
-)
-def test_the_side_that_is_not_taken_is_not_evaluated(derivative: Derivative, undefined: Op) -> None:
-    """At x <= 0 the other side has no value, real or at all; mpmath raises or turns complex."""
-    g = Graph()
-    (x,) = wrt = unknowns(g, 1)
-    root = g.branch(g.compare(Op.LT, g.zero, x), g.node(undefined, (x,)), g.mul(x, x))
-    (slope,) = derivative(g, root, wrt)
-    (curvature,) = derivative(g, slope, wrt)
-    for at in (0, -2):
-        for node, expected in ((root, at**2), (slope, 2 * at), (curvature, 2)):
-            found = evaluate(node, inputs(at))
-            assert isinstance(found, mpmath.mpf)
-            assert found == expected
-    assert right([slope], root, inputs("0.3"))
-    assert right([curvature], slope, inputs("0.3"))
-
-
-@BOTH
-def test_a_branch_stays_a_branch(derivative: Derivative) -> None:
-    g = Graph()
-    (x,) = wrt = unknowns(g, 1)
-    condition = g.compare(Op.LT, x, g.zero)
-    (slope,) = derivative(g, g.branch(condition, g.power(x, 3), g.call(Op.SIN, x)), wrt)
-    assert slope.op is Op.BRANCH
-    assert slope.args[0] is condition
-    assert derivative(g, g.branch(condition, g.one, g.const(2)), wrt) == [g.zero]
-
-
-@BOTH
-@pytest.mark.parametrize("twice", [False, True], ids=["once", "twice"])
-def test_a_named_value_used_in_one_side_only_is_not_evaluated_for_the_other(
-    derivative: Derivative, twice: bool
-) -> None:
-    g = Graph()
-    (x,) = wrt = unknowns(g, 1)
-    positive = g.compare(Op.LT, g.zero, x)
-    named = g.name("log_x", g.call(Op.LOG, x))
-    root = g.branch(positive, g.mul(named, named), g.mul(x, x))
-    if twice:
-        root = g.add(root, g.branch(positive, g.call(Op.SIN, named), g.neg(x)))
-    (slope,) = derivative(g, root, wrt)
-    assert right([slope], root, inputs("0.3"))
-    assert evaluate(slope, inputs(0)) == (-1 if twice else 0)
-
-
-def test_gradient_with_respect_to_a_value_inside_a_branch() -> None:
-    g = Graph()
-    (x,) = unknowns(g, 1)
-    inner = g.add(x, g.one)
-    root = g.branch(g.compare(Op.LT, x, g.const(5)), g.mul(inner, inner), inner)
-    assert same_value(gradient(g, root, [inner])[inner], g.mul(g.const(2), inner), AT)
-
-
 # ------------------------------------------------------------------------------------ exceptions
 
 
@@ -325,26 +264,6 @@ def test_a_given_derivative_can_be_the_chain_rule_by_hand() -> None:
     assert right([linear.derivative(root, j) for j in range(3)], root, AT)
 
 
-def test_a_given_derivative_with_respect_to_something_the_value_does_not_contain() -> None:
-    g = Graph()
-    (x,) = wrt = unknowns(g, 1)
-    other = g.name("v", g.call(Op.SIN, x))
-    special = g.name("s", g.mul(x, x))
-    given_ = {special: {other: g.const(3)}}
-    expected = g.mul(g.const(3), g.call(Op.COS, x))
-    assert same_value(Linearisation(g, wrt, given=given_).derivative(special, 0), expected, AT)
-    assert same_value(gradient(g, special, wrt, given=given_)[x], expected, AT)
-
-
-def test_conditions_have_no_derivative_and_sums_no_local_one() -> None:
-    g = Graph()
-    (x,) = unknowns(g, 1)
-    assert partials(g, g.compare(Op.LT, x, g.one)) == []
-    assert partials(g, x) == []
-    with pytest.raises(DifferentiationError, match="no derivative rule for sum"):
-        partials(g, g.sum(g.mul(x, g.input("rule", 0, varying=True))))
-
-
 # --------------------------------------------------------------------- models: sums and interfaces
 
 RULE = [(mpmath.mpf(t), mpmath.mpf(w)) for t, w in (("-0.7", "0.6"), ("0.1", "0.9"), ("0.8", "1"))]
@@ -388,37 +307,6 @@ def test_sums_over_points(interface: bool, summed: bool) -> None:
     assert matrices_agree(linearised(d, state), exact(d, state))
 
 
-def test_interface_and_direct_differentiation_agree() -> None:
-    """Forward mode through the interface, against forward mode straight to the unknowns."""
-    d, state = bar(interface=True, summed=True), bar_state()
-    g = d.graph
-    adjoint = gradient(g, d.potential, d.directions)
-    through = Linearisation(g, d.directions, [z for z in d.interface if z.varying])
-    direct = Linearisation(g, d.directions)
-    for u in d.directions:
-        for j in range(3):
-            a, b = (value(d, x.derivative(adjoint[u], j), state) for x in (through, direct))
-            assert close(a, b)
-            assert a != 0
-
-
-def test_the_mirrored_tangent_equals_the_unmirrored_one() -> None:
-    d, state = bar(interface=True), bar_state()
-    g = d.graph
-    adjoint = gradient(g, d.potential, d.directions)
-    mirror = {adjoint[z]: z for z in d.interface}
-    once = Linearisation(g, d.directions, d.interface, symmetric=mirror)
-    twice = Linearisation(g, d.directions, d.interface)
-    entries: dict[bool, list[Node]] = {True: [], False: []}
-    for u in d.directions:
-        for j in range(3):
-            pair = once.derivative(adjoint[u], j), twice.derivative(adjoint[u], j)
-            assert close(value(d, pair[0], state), value(d, pair[1], state))
-            entries[True].append(pair[0])
-            entries[False].append(pair[1])
-    assert operations(entries[True]) < operations(entries[False]), "that is what it is for"
-
-
 def pseudo(*, frozen: bool) -> Definition:
     """A weak form with a factor that depends on the unknowns, or the same as a true potential."""
     m = Model("pseudo", nodes=1, rule=quadrature.gauss(2, 1))
@@ -446,21 +334,6 @@ def test_pseudo_potentials_freeze_in_the_residual_and_not_in_the_tangent() -> No
     assert not close(linearised(free, state)[0][0], by_hand)
 
 
-def test_weak_forms_vary_only_what_is_varied() -> None:
-    m = Model("weak", nodes=1, rule=quadrature.gauss(2, 1))
-    u, v = m.unknown("u"), m.unknown("v")
-    (xi,) = m.point()
-    m.weak_form([(sp.sin(v) * xi**2, u), (u * v, v + xi * u)])
-    d = m.finish()
-    assert Task.ENERGY not in task_outputs.tasks(d)
-    state = State((0, 0), ("0.4", "-0.3"), (), (), RULE)
-    R, K = linearised(d, state)
-    assert matrices_agree((R, K), exact(d, state))
-    with mpmath.workdps(50):
-        x, y = (mpmath.mpf(s) for s in state.dofs)
-        assert close(R[1], x * y * mpmath.fsum(w for _, w in RULE))
-
-
 def line_model(term: str) -> Definition:
     """An interpolated field p with one direct unknown u."""
     m = Model("line", nodes=1, rule=quadrature.gauss(2, 1))
@@ -476,50 +349,12 @@ def line_model(term: str) -> Definition:
     return m.finish()
 
 
-def test_interpolated_unknowns() -> None:
-    nodes = [mpmath.mpf(t) for t in ("-1", "0.25", "1")]
-    basis = [[_lagrange(nodes, k, t) for k in range(3)] for t, _ in RULE]
-    state = State((0, 0), ("0.3", "0.6", "-0.4", "1.2"), (), (), RULE, basis)
-    for term in ("local", "mean"):
-        d = line_model(term)
-        assert matrices_agree(linearised(d, state), exact(d, state))
-
-
-def _lagrange(nodes: list[Any], k: int, t: Any) -> tuple[Any, Any]:
-    with mpmath.workdps(60):
-        others = [n for n in nodes if n is not nodes[k]]
-        scale = mpmath.fprod(nodes[k] - n for n in others)
-        return mpmath.fprod(t - n for n in others) / scale, mpmath.fsum(
-            t - n for n in others
-        ) / scale
-
-
 def test_a_mean_of_an_interpolated_field_may_not_enter_a_sum_again() -> None:
     """It would couple every mode at one point with every mode at another: no kernel for that."""
     d = line_model("again")
     task_outputs.outputs(d, Task.RESIDUAL)
     with pytest.raises(DifferentiationError, match="may not enter a sum again"):
         task_outputs.outputs(d, Task.TANGENT)
-
-
-def test_a_value_at_a_point_by_a_symbol_of_all_points() -> None:
-    """Its derivative there, not the sum over the points."""
-    m = Model("point", nodes=1, rule=quadrature.gauss(2, 1))
-    u = m.unknown("u")
-    (xi,) = m.point()
-    one = m.define("one", sp.Integer(1))
-    slope = m.derivative("slope", (2 + xi) * u**2 * one**3, one)
-    m.fields(slope=slope)
-    m.potential(m.integral("Pi", (2 + xi) * u**2))
-    d = m.finish()
-    state = State((), (5,), (), (), RULE)
-    with mpmath.workdps(50):
-        walk = Walk(state, {})
-        for q, (at, _) in enumerate(RULE):
-            assert close(walk.at(d.fields[0][1], q), 75 * (2 + mpmath.mpf(at)), 1e-45)
-    mean = m.integral("mean", u * one * xi)
-    with pytest.raises(ModelError, match=r"slopes: .* depends on an integral"):
-        m.derivative("slopes", mean * xi * one, one)
 
 
 def test_a_wrong_tangent_graph_is_detected() -> None:
@@ -533,8 +368,3 @@ def test_a_wrong_tangent_graph_is_detected() -> None:
     for wrong in (slightly, transposed):
         assert not matrices_agree((R, wrong), (R, K))
     assert not matrices_agree(([-r for r in R], K), (R, K))
-
-
-def test_shipped_conservative_models_are_those_with_an_energy() -> None:
-    found = {name for name, make in ALL.items() if make().conservative}
-    assert found == set(ENERGIES)

@@ -14,11 +14,10 @@ import sympy as sp
 
 import softehl
 from softehl.codegen import pipeline
-from softehl.codegen.derive import potential_structure
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.weak_form import Form, Page
-from softehl.codegen.tools import build, kernel_cache
+from softehl.codegen.tools import build
 from softehl.codegen.verify import verification
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
@@ -70,7 +69,7 @@ def called(kernel: Kernel, task: str, X: Array, dofs: Array, given: Any) -> list
     [
         (field_pages.mixed, "tri6", "plane strain"),
         (field_pages.constant_pressure, "quad4", "plane strain"),
-        (field_pages.heat, "hex8", "solid"),
+        (field_pages.heat, "quad4", "plane strain"),
         (field_pages.creep, "quad4", "axisymmetric"),
         (field_pages.fbar, "tri6", "plane strain"),
         pytest.param(field_pages.mixed, "quad9", "axisymmetric", marks=pytest.mark.slow),
@@ -222,49 +221,6 @@ def test_one_page_has_exact_derivatives_on_ten_cells(cell: str, tmp_path: Path) 
 # ----------------------------------------------------------------------------------- the choice
 
 
-def test_small_elements_stay_whole_and_large_ones_do_not() -> None:
-    def at_points(cell: str, page: Page = field_pages.rubber) -> bool:
-        return pipeline.form(page.definition(cell)).at_points
-
-    assert not any(map(at_points, ("tri3", "tri6", "quad4", "tet4", "wedge6")))
-    assert all(map(at_points, ("quad9", "hex8", "tet10")))
-    assert at_points("tri3", field_pages.creep)
-
-
-def test_values_at_the_centroid_that_are_varied_or_no_fields_need_the_whole_element() -> None:
-    def page(write: Callable[[Fields, Any], None]) -> Page:
-        return Page("middle", lambda m: write(m, m.scalar("T")))
-
-    def at_point(write: Callable[[Fields, Any], None]) -> bool:
-        return page(write).definition("tri6").point is not None
-
-    assert at_point(lambda m, T: m.weak(m.centroid(T**2) * m.grad(T), m.grad(T)))
-    assert not at_point(lambda m, T: m.minimise(T**2 * m.centroid(T)))
-    assert not at_point(lambda m, T: m.weak(m.centroid(m.previous(T)) * m.grad(T), m.grad(T)))
-    assert not at_point(lambda m, T: m.weak(T * m.centroid(m.parameters(k="a")[0] * T), T))
-
-
-def test_derivatives_that_are_asked_for_later_are_known_at_the_point() -> None:
-    d = field_pages.rubber.definition("quad9")
-    by = d.graph.input("parameters", 1)
-    kernel = pipeline.compile_model(replace(d, derivatives=(("K", by),)))
-    assert "d_K" in kernel.functions
-    assert kernel.functions["d_K"].printer == "points"
-    place = d.graph.input("coordinates", 4)
-    assert not pipeline.form(replace(d, derivatives=(("X3", place),))).at_points
-
-
-def test_invariants_are_looked_for_in_the_plane_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    searched = []
-    monkeypatch.setattr(
-        potential_structure, "through_invariants", lambda *given: searched.append(given)
-    )
-    potential_structure.found_in(field_pages.rubber.definition("tet4"))
-    assert not searched
-    potential_structure.found_in(field_pages.rubber.definition("tri3"))
-    assert searched
-
-
 def test_moduli_of_a_weak_form_that_are_symmetric_are_found_to_be() -> None:
     def symmetric(write: Callable[[Fields], Any]) -> bool:
         d = Page("flow", write, form="point").definition("quad9")
@@ -282,44 +238,6 @@ def test_moduli_of_a_weak_form_that_are_symmetric_are_found_to_be() -> None:
 
     assert symmetric(lambda m: flux(m, 2))
     assert not symmetric(turned)
-
-
-def test_tangents_of_moduli_are_one_file_for_all_pages() -> None:
-    @softehl.page
-    def other(m: Fields) -> None:
-        F = m.deformation_gradient(m.vector("v"))
-        (a,) = m.parameters(a="modulus")
-        m.minimise(a * (F.T * F).trace() ** 2)
-
-    pages = [field_pages.rubber, other]
-    shared = [set(kernel_cache.derive([p.definition("quad9")])[0]) for p in pages]
-    (name,) = {n for n in shared[0] if n.startswith(build.SHARED)}
-    assert name in shared[1]
-
-
-def test_gradients_go_through_names(tmp_path: Path, rng: np.random.Generator) -> None:
-    def named(m: Fields) -> None:
-        T = m.scalar("T")
-        (k,) = m.parameters(k="factor")
-        heat = m.define("heat", k * T**3)
-        m.weak(m.grad(heat), m.grad(T))
-
-    def written(m: Fields) -> None:
-        T = m.scalar("T")
-        (k,) = m.parameters(k="factor")
-        m.weak(3 * k * T**2 * m.grad(T), m.grad(T))
-
-    ways: list[tuple[Callable[[Fields], None], Form]]
-    ways = [(named, "whole"), (named, "point"), (written, "whole")]
-    kernels = [
-        made(Page(write.__name__, write), "tri3", None, form, tmp_path / write.__name__)
-        for write, form in ways
-    ]
-    X, dofs, given = state(kernels[0], "tri3", rng)
-    results = [k.tangent(X, dofs, **given) for k in kernels]
-    for other in results[1:]:
-        for a, b in zip(results[0], other, strict=True):
-            assert np.abs(a - b).max() < 1e-13 * np.abs(a).max()
 
 
 # --------------------------------------------------------------------------------------- errors
@@ -388,22 +306,6 @@ def test_cells_geometries_and_forms_are_checked() -> None:
         softehl.load_kernel(field_pages.rubber)
     with pytest.raises(ModelError, match='allowed are "whole" and "point"'):
         softehl.page(form="fast")  # type: ignore[call-overload]
-
-
-@pytest.mark.parametrize("kind", ["parameters", "data", "point_data", "define", "scalar"])
-def test_names_of_the_geometry_are_free_on_a_page_of_fields(kind: str) -> None:
-    for name in ("detJ", "dX_00", "dN_00", "weight", "xi", "J", "N", "p", "self"):
-
-        def page(m: Fields, name: str = name) -> None:
-            """A page."""
-            T = m.scalar("T")
-            if kind in ("define", "scalar"):
-                a = m.define(name, 1 + T**2) if kind == "define" else m.scalar(name)
-            else:
-                (a,) = getattr(m, kind)(**{name: "as the user likes"})
-            m.minimise((1 + a**2) * m.grad(T).dot(m.grad(T)))
-
-        assert softehl.page(page).definition("quad4").nodes == 4
 
 
 def test_a_name_for_two_things_says_which() -> None:

@@ -14,8 +14,6 @@ from pathlib import Path
 
 import pytest
 
-from softehl.codegen import pipeline
-from softehl.codegen.emit.liveness import peak_live
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import cli, cost_table
 from softehl.codegen.tools.build import GENERATED
@@ -79,14 +77,6 @@ def contents(directory: Path) -> dict[str, bytes]:
     return {p.name: p.read_bytes() for p in directory.iterdir()}
 
 
-def test_generate_starts_from_nothing(copy: Path) -> None:
-    files = contents(copy)
-    assert {"contact.c", "follower_pressure.c", "signature.c", "manifest.json"} < set(files)
-    for name in ("contact.c", "follower_pressure.c", "signature.c"):
-        assert files[name] == (GENERATED / name).read_bytes()
-    assert cli.generate(check=True) == 0
-
-
 def test_check_names_every_kind_of_difference_and_writes_nothing(
     copy: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -111,15 +101,6 @@ def test_check_names_every_kind_of_difference_and_writes_nothing(
     assert contents(copy) == before
 
 
-def test_check_creates_nothing(
-    copy: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(cli, "GENERATED", copy / "missing")
-    assert cli.generate(check=True) == 1
-    assert not (copy / "missing").exists()
-    assert capsys.readouterr().err.endswith(REMEDY + "\n")
-
-
 def test_generate_mends_what_check_names(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
     original = contents(copy)
     (copy / "contact.c").write_text("int contact;\n")
@@ -130,38 +111,6 @@ def test_generate_mends_what_check_names(copy: Path, capsys: pytest.CaptureFixtu
     assert "2 of them new or changed" in capsys.readouterr().out
     assert contents(copy) == original
     assert (copy / "follower_pressure.c").stat().st_mtime_ns == untouched
-
-
-def test_trace_shows_every_stage_of_every_task(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "160")
-    assert cli.generate(trace="solid_q4") == 0
-    printed = capsys.readouterr().out
-    source = pipeline.compile_model(ALL["solid_q4"]())
-    assert re.findall(r"solid_q4 (\w+) ─", printed) == list(source.functions)
-    tangent = printed[printed.index("solid_q4 tangent") : printed.index("solid_q4 fields")]
-    function = source.functions["tangent"]
-    assert function.found is not None
-    assert "8 unknowns, 7 modal coordinates, 5 values at a point, 5 linear forms" in tangent
-    assert f"{len(function.found.squares)} invariants" in tangent
-    assert len(function.attempts) == 2
-    for a in function.attempts:
-        assert re.search(rf"{a.rule}, .*: {a.operations} operations of one element", tangent)
-        for row in a.passes:
-            assert re.search(rf"{row.name} .*\b{row.nodes} +{row.operations}\b", tangent), row
-    best = min(a.operations for a in function.attempts)
-    assert function.chosen.operations == best
-    assert re.search(rf"choice +chain rule {function.attempts.index(function.chosen) + 1}", tangent)
-    assert f"{function.plan.operations_once} operations once; no loops" in tangent
-    assert f"{peak_live(function.plan)} in the printed order" in tangent
-    assert f"simd: {function.temporaries} temporaries" in tangent
-
-
-def test_every_stage_is_named_on_the_first_screen_of_the_pipeline() -> None:
-    stages = re.findall(r"^    (\w+(?: \w+)?)  +\w", pipeline.__doc__ or "", re.MULTILINE)
-    assert stages[:5] == ["page", "tasks", "interfaces", "invariants", "chain rule"]
-    assert stages[5:] == ["passes", "schedule", "choice", "order", "print", "routines"]
 
 
 def test_trace_of_an_unknown_kernel(capsys: pytest.CaptureFixture[str]) -> None:
@@ -176,15 +125,6 @@ def test_the_cost_table_lists_every_kernel(
     assert cost_table.kernels() == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in (*ALL, "temporaries"))
-
-
-def test_the_cost_table_keeps_names_whole(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    assert cost_table.kernels() == 0
-    printed = capsys.readouterr().out
-    assert all(name in printed for name in ALL)
 
 
 def test_no_routine_is_written_twice() -> None:

@@ -6,8 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from softehl.codegen.graph.graph import FREE, Graph, Node, Op
-from softehl.codegen.graph.traversal import operations, reachable
+from softehl.codegen.graph.graph import Graph, Op
 from tests.codegen.workshop import unknowns
 
 
@@ -46,13 +45,6 @@ def test_constants_are_exact() -> None:
     assert g.power(third, -4).value == 81
     assert g.const(10**30 + 1) is not g.const(10**30)
     assert g.const(Fraction(2, 4)) is g.const(Fraction(1, 2))
-
-
-def test_irrational_constants_stay_symbolic() -> None:
-    g = Graph()
-    assert g.power(g.const(2), Fraction(1, 2)).op is Op.POW
-    assert g.call(Op.SQRT, g.const(2)).op is Op.SQRT
-    assert g.mul(g.const(2), g.pi()).op is Op.MUL
 
 
 def test_division_by_exact_zero_is_an_error() -> None:
@@ -120,25 +112,6 @@ def test_signs_are_pulled_outwards() -> None:
     assert g.neg(g.const(5)).value == -5
 
 
-def test_commutative_operands_are_ordered() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    assert g.add(x, y) is g.add(y, x)
-    assert g.mul(x, y) is g.mul(y, x)
-    assert g.add(y, x).args == (x, y)
-    late = g.const(7)
-    assert g.mul(x, late).args == (late, x), "a constant factor comes first"
-
-
-def test_operands_are_older_than_their_users() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    root = g.div(g.add(g.mul(x, y), g.call(Op.SIN, y)), g.sub(x, g.const(2)))
-    nodes = reachable([root])
-    assert [n.id for n in nodes] == sorted(n.id for n in nodes)
-    assert all(a.id < n.id for n in nodes for a in n.args)
-
-
 def test_varying_follows_the_operands_up_to_a_sum() -> None:
     g = Graph()
     (x,) = unknowns(g, 1)
@@ -155,56 +128,3 @@ def test_varying_follows_the_operands_up_to_a_sum() -> None:
     assert condition.varying
     assert g.branch(condition, x, g.zero).varying
     assert g.name("n", inside).varying
-
-
-def test_rebuild_applies_the_identities_again() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    one = Fraction(1)
-    condition = g.compare(Op.LE, x, y)
-    table: list[tuple[Op, tuple[Node, ...], Fraction | str | None, Node]] = [
-        (Op.ADD, (x, g.zero), None, x),
-        (Op.SUB, (x, x), None, g.zero),
-        (Op.MUL, (g.one, y), None, y),
-        (Op.NEG, (g.neg(x),), None, x),
-        (Op.RECIP, (g.recip(y),), None, y),
-        (Op.POW, (x,), one, x),
-        (Op.LOG, (g.one,), None, g.zero),
-        (Op.BRANCH, (condition, y, y), None, y),
-        (Op.SUM, (g.zero,), None, g.zero),
-        (Op.CONST, (), one, g.one),
-        (Op.NAME, (x,), "label", g.name("label", x)),
-        (Op.LE, (x, y), None, condition),
-    ]
-    for op, args, payload, expected in table:
-        assert g.rebuild(op, args, payload) is expected, op
-
-
-def test_reachable_stops_where_it_is_told_and_counts_shared_values_once() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    product = g.mul(x, y)
-    named = g.name("p", product)
-    root = g.add(g.call(Op.SIN, named), g.call(Op.COS, named))
-    assert set(reachable([root])) == {x, y, product, named, *root.args, root}
-    above = reachable([root], stop=lambda n: n is named)
-    assert set(above) == {named, *root.args, root}
-    assert reachable([root, root, x]) == reachable([root])
-    assert reachable([]) == []
-    # x y, sin, cos, +: the name and the inputs are free, the product is counted once
-    assert operations([root]) == 4
-    assert operations([root, product]) == 4
-
-
-def test_leaves_and_sums_cost_nothing() -> None:
-    g = Graph()
-    (x,) = unknowns(g, 1)
-    leaves = [x, g.pi(), g.const(3), g.name("n", x), g.sum(g.input("rule", 0, varying=True))]
-    assert operations(leaves) == 0
-    assert {n.op for n in leaves} - {Op.SUM} == FREE
-
-
-def test_nodes_print_what_they_are() -> None:
-    g = Graph()
-    (x,) = unknowns(g, 1)
-    assert repr(g.power(x, 2)) == f"#{len(g) - 1} pow(#{x.id}) 2"

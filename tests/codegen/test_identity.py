@@ -17,7 +17,7 @@ from softehl.codegen.graph.prime_field import PRIME, close_rational
 from softehl.codegen.graph.traversal import operations
 from softehl.codegen.graph.verifier import check
 from softehl.codegen.language.sympy_lowering import Lowering
-from softehl.codegen.optimise.passes import powers, run, straight_line
+from softehl.codegen.optimise.passes import powers
 from softehl.codegen.optimise.value_numbering import merge_equal
 from tests.codegen.random_models import UNKNOWNS, Digits, K, Meaning, OutsideError, Recipe
 from tests.codegen.random_models import expressions as random_expressions
@@ -208,10 +208,3 @@ def test_a_third_power_has_its_value_at_zero() -> None:
     (cheap,) = powers(g, roots)
     assert evaluate(cheap, {("dofs", 0): 0}) == 0
     assert same_value(cheap, roots[0], inputs("1.3"))
-
-
-def test_an_inverse_beside_a_guarded_root_keeps_its_sign() -> None:
-    """1/x is made of x^(-1/3) only where that root is taken in any case."""
-    g, roots = lowered(sp.Piecewise((x ** sp.Rational(-1, 3), x > 0), (1 / x, True)))
-    after, _ = run(g, roots, straight_line([[Fraction(0), Fraction(2)]]))
-    assert evaluate(after[0], {("dofs", 0): -2}) == mpmath.mpf(-1) / 2

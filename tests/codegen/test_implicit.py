@@ -14,7 +14,7 @@ import sympy as sp
 from softehl.codegen import pipeline
 from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.differentiation import gradient
-from softehl.codegen.graph.evaluation import State, evaluate
+from softehl.codegen.graph.evaluation import evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.routines import Newton, inverse
 from softehl.codegen.graph.traversal import reachable
@@ -24,7 +24,7 @@ from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build, output_files
 from softehl.codegen.verify.graph_oracle import Oracle
-from softehl.runtime.kernels.kernel import ArgumentError, Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.workshop import compiled, difference, element_state, off, tangent_errors
 
 HISTORY = np.array([[0.3], [0.5]])
@@ -89,22 +89,6 @@ def test_systems_against_the_oracle(n: int, family: Any) -> None:
     assert off(kernel.fields_at(NOWHERE, u, **named)[0], Oracle(d).fields(at)) <= 1e-14
 
 
-def test_the_oracle_solves_the_equation_itself() -> None:
-    """s^3 + k s = e + h, checked by putting the oracle's s back; a wrong tangent is refused."""
-    d = coupled(1, unroll=False)
-    at = element_state_of_one(d)
-    for (s, _), (h,), (xi, _) in zip(Oracle(d).fields(at), HISTORY, at.rule, strict=True):
-        with mpmath.workdps(60):
-            e = mpmath.mpf(0.7) * (1 + mpmath.mpf(xi)) + mpmath.mpf(0.4) ** 2
-            assert abs(s**3 + 2 * s - e - mpmath.mpf(h)) < 1e-50
-
-
-def element_state_of_one(d: Definition) -> State:
-    rows = zip(d.rule.points, d.rule.weights, strict=True)
-    table = [[float(x.evalf(30)) for x in (*p, w)] for p, w in rows]
-    return State((), (0.7, 0.4), (), (2.0,), table, (), HISTORY.tolist())
-
-
 def test_a_forgotten_dependence_of_the_equation_is_refused(tmp_path: Path) -> None:
     """With dg/dp of one operand taken for zero, residual and tangent must both be found wrong."""
     d = coupled(1, unroll=False)
@@ -116,30 +100,6 @@ def test_a_forgotten_dependence_of_the_equation_is_refused(tmp_path: Path) -> No
     kernel = compiled(d, tmp_path)
     errors = tangent_errors(d, kernel, (), [0.7, 0.4], parameters=[2.0], point_data=HISTORY)
     assert min(errors) > 1e-3
-
-
-def test_local_unknowns_held_constant(tmp_path: Path) -> None:
-    """Frozen in the residual, moving in the tangent: dW/dx at s, then the whole derivative."""
-    m = one(lambda s, x: s + sp.log(s) - x, name="frozen")
-    s, x = m.s, sp.Symbol("x", real=True)  # type: ignore[attr-defined]
-    m.potential(s**2 * x**3, constant=[s])
-    d = m.finish()
-    kernel = compiled(d, tmp_path)
-    assert max(tangent_errors(d, kernel, (), [0.8])) <= 1e-14
-
-
-def test_a_matrix_of_unknowns_and_a_branch(tmp_path: Path) -> None:
-    """A symmetric square root by A A = B; solved only on the side that is taken."""
-    m = Model("root", nodes=1, rule=quadrature.point_rule())
-    a, b = m.unknown("a"), m.unknown("b")
-    B = sp.Matrix([[a, b / 3], [b / 3, 2]])
-    A = m.implicit("A", lambda A: A * A - B, start=sp.eye(2))
-    assert A.shape == (2, 2)
-    m.potential(sp.Piecewise((A.det() ** 3 + A[0, 1] ** 2, a > 0), (a**2 * b, True)))
-    d = m.finish()
-    kernel = compiled(d, tmp_path)
-    for u in ([1.7, 0.9], [-1.5, 0.4]):  # no real root on the other side: never looked for
-        assert max(tangent_errors(d, kernel, (), u)) <= 1e-13
 
 
 # --------------------------------------------------------------------------------------- failure
@@ -165,17 +125,6 @@ def test_an_equation_without_a_solution_spoils_its_element_only(tmp_path: Path) 
         assert np.isfinite(values[[0, 2]]).all()
         assert np.isnan(values[1]).all()
     np.testing.assert_allclose(kernel.fields_at(X, u)[[0, 2], 0, 1], [2.0, 3.0], rtol=1e-15)
-
-
-def test_too_few_iterations_are_a_failure(tmp_path: Path) -> None:
-    for limit, enough in ((3, False), (30, True)):
-        m = one(lambda s, x: sp.exp(s) - x, start=5, name=f"limit_{limit}", iterations=limit)
-        m.potential(m.s)  # type: ignore[attr-defined]
-        (tmp_path / str(limit)).mkdir()
-        kernel = compiled(m.finish(), tmp_path / str(limit))
-        found = kernel.energy(np.zeros((1, 0)), np.array([[2.0]]))
-        assert np.isfinite(found[0]) == enough
-        assert not enough or abs(found[0] - np.log(2)) < 1e-15
 
 
 def test_a_singular_system_is_a_failure(tmp_path: Path) -> None:
@@ -224,29 +173,6 @@ def test_a_routine_is_taken_by_its_items() -> None:
 
 
 # ------------------------------------------------------------------------------------- arguments
-
-
-def test_point_data_are_checked(family: Any) -> None:
-    _, kernel = family["coupled_1"]
-    assert kernel.point_data == ("h",)
-    u = np.zeros((1, 2))
-    for wrong in (None, HISTORY, HISTORY[None, :1], np.zeros((1, 2, 2))):
-        with pytest.raises(ArgumentError, match=r"point_data has shape .* must be \(1, 2, 1\)"):
-            kernel.residual(NOWHERE, u, parameters=[2.0], point_data=wrong)
-
-
-def test_elements_and_points_have_their_own_data(family: Any, rng: np.random.Generator) -> None:
-    for n, _ in SIZES[:2]:
-        _, kernel = family[f"coupled_{n}"]
-        u, h = rng.uniform(0.2, 0.6, (7, 2)), rng.uniform(0.1, 0.5, (7, 2, 1))
-        X = np.zeros((7, 0))
-        together = kernel.residual(X, u, parameters=[2.0], point_data=h)
-        for e in range(7):
-            part = slice(e, e + 1)
-            alone = kernel.residual(X[part], u[part], parameters=[2.0], point_data=h[part])
-            np.testing.assert_array_equal(alone[0], together[e])
-        swapped = kernel.residual(X, u, parameters=[2.0], point_data=h[:, ::-1])
-        assert np.abs(swapped - together).min() > 0
 
 
 def test_as_many_equations_as_unknowns() -> None:
@@ -335,13 +261,6 @@ def test_slips_that_are_nothing_but_rounding_end_the_iteration(tmp_path: Path) -
     assert np.isfinite(r).all()
     assert np.isfinite(K).all()
     assert np.abs(r[:, 0]).max() < 3.0  # it flows: 3.8 if it did not
-
-
-def test_one_factor_is_an_equation(tmp_path: Path) -> None:
-    d = small("factor", lambda s, x: sp.log(s / x) * (2 + s), start=sp.Symbol("x", real=True) * 2)
-    kernel = compiled(d, tmp_path)
-    found = kernel.fields_at(np.zeros((1, 0)), np.array([[3e-9]]))[0, 0, 0]
-    assert abs(found - 3e-9) <= 1e-15 * 3e-9
 
 
 @pytest.mark.parametrize("vector", [False, True])

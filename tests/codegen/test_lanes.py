@@ -22,7 +22,7 @@ from softehl.codegen.emit import c_source
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import build, user_kernels
+from softehl.codegen.tools import build
 from softehl.codegen.verify.graph_oracle import Oracle
 from softehl.runtime.discretisation.quadrature import film_rule
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
@@ -303,18 +303,3 @@ def test_a_long_file_is_compiled_lightly(tmp_path: Path, monkeypatch: pytest.Mon
         build.build(tmp_path)
         (compiling,) = (c for c in commands if str(tmp_path / "some_yield.c") in c)
         assert (build.LIGHT in compiling) is light
-
-
-def test_long_loops_that_pages_share_are_compiled_lightly() -> None:
-    loops = Path(f"{build.SHARED}hex27.c")
-    assert build.lighter(loops, " + " * 2501) == build.SHARED_LIGHT
-    assert build.lighter(loops, " + " * 2500) == ()
-    assert build.lighter(Path("mine.c"), " + " * 2501) == ()
-
-
-def test_the_time_of_an_element_is_measured(library: Any) -> None:
-    d, kernel = library["branched"]
-    tasks = ("energy", "residual", "tangent", "fields")
-    found = user_kernels.nanoseconds(d, tasks, Path(kernel.library.path))
-    assert list(found) == list(tasks)
-    assert all(0 < t < 1e5 for t in found.values())

@@ -66,23 +66,9 @@ def test_values_of_a_long_page_are_those_of_the_oracle(
 
 
 @pytest.mark.slow
-def test_two_thousand_names() -> None:
-    d = chain(2_000, "residual")
-    function = pipeline.compile_model(d).functions["residual"]
-    assert function.chosen.operations > 4 * 2_000
-    assert float(Oracle(d).potential(STATE)) == pytest.approx(0.21, abs=0.05)
-
-
-@pytest.mark.slow
 def test_ten_thousand_names() -> None:
     functions = pipeline.compile_model(chain(10_000, "residual")).functions
     assert functions["residual"].chosen.operations > 10_000
-
-
-@pytest.mark.slow
-def test_five_hundred_terms() -> None:
-    functions = pipeline.compile_model(addition(500, "residual", "tangent")).functions
-    assert functions["residual"].chosen.operations > 3 * 500
 
 
 def test_a_deep_expression_is_lowered() -> None:

@@ -11,9 +11,7 @@ import sympy as sp
 
 from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.evaluation import evaluate
-from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.traversal import operations, reachable
-from softehl.codegen.language import kinematics as kin
+from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.sympy_lowering import Lowering
@@ -69,75 +67,7 @@ def test_graph_and_sympy_have_one_value(expression: Any, at: tuple[Any, Any]) ->
         assert close(value(expression, *numbers), expected, 1e-45)
 
 
-def test_equal_subexpressions_are_one_node() -> None:
-    g, lower = lowering()
-    root = lower(sp.sin(x * y) + sp.cos(x * y) + sp.log(x * y))
-    assert operations([root]) == 1 + 3 + 2  # x y, three functions of it, two sums
-    assert lower(x * y) is lower(y * x)
-    assert lower(x * y) in reachable([root])
-    size = len(g)
-    lower(sp.sin(x * y))
-    assert len(g) == size
-
-
-def test_nothing_is_expanded() -> None:
-    a, b = sp.symbols("a b", real=True)
-    assert operations([lowered((x + y) ** 9)]) == 2
-    g = Graph()
-    lower = Lowering(g, dict(zip((x, y, a, b), unknowns(g, 4), strict=True)))
-    assert operations([lower((x + y) * (a + b))]) == 3
-
-
-def test_numbers_are_exact() -> None:
-    tenth = lowered(sp.Rational(1, 10))
-    assert tenth.op is Op.CONST
-    assert tenth.value.denominator == 10
-    assert lowered(7).value == 7
-    assert lowered(sp.pi).op is Op.PI
-    assert lowered(sp.sqrt(2)).op is Op.POW
-    assert lowered(sp.Integer(10) ** 40).value == 10**40
-    assert lowered(sp.E).op is Op.EXP
-
-
-def test_quotients_share_one_reciprocal() -> None:
-    ops = [n.op for n in reachable([lowered(y / (x**2 * (x + y)))])]
-    assert ops.count(Op.RECIP) == 1
-    assert lowered(1 / x).op is Op.RECIP
-
-
-def test_functions_and_powers() -> None:
-    for function, op in ((sp.log, Op.LOG), (sp.exp, Op.EXP), (sp.sin, Op.SIN), (sp.cos, Op.COS)):
-        assert lowered(function(x)).op is op
-    root = lowered(x ** sp.Rational(2, 7))
-    assert (root.op, str(root.payload)) == (Op.POW, "2/7")
-    assert lowered(x**y).op is Op.POWER
-    assert lowered((1 + x**2) ** y).op is Op.EXP  # a base that is positive in any case
-
-
 # --------------------------------------------------------------------------------------- branches
-
-
-def test_piecewise_is_a_chain_of_branches() -> None:
-    g, lower = lowering()
-    root = lower(sp.Piecewise((x, x > y), (y, sp.Ne(x, 0)), (x * y, True)))
-    assert root.op is Op.BRANCH
-    condition, then, otherwise = root.args
-    X, Y = lower(x), lower(y)
-    assert condition is g.compare(Op.LT, Y, X)
-    assert then is X
-    # Ne is NOT EQ, which the branch constructor turns round
-    assert otherwise is g.branch(g.compare(Op.EQ, X, g.zero), lower(x * y), Y)
-
-
-def test_piecewise_takes_the_first_side_that_holds() -> None:
-    steps = sp.Piecewise((sp.Integer(1), x < 0), (sp.Integer(2), x < 1), (sp.Integer(3), True))
-    assert [value(steps, v, 0) for v in (-1, 0, "0.5", 1, 2)] == [1, 2, 2, 3, 3]
-
-
-def test_untaken_sides_are_not_evaluated() -> None:
-    guarded = sp.Piecewise((sp.log(x) / x, x > 0), (x**2, True))
-    assert value(guarded, 0, 0) == 0
-    assert value(guarded, -2, 0) == 4
 
 
 @pytest.mark.parametrize(
@@ -158,33 +88,6 @@ def test_untaken_sides_are_not_evaluated() -> None:
 def test_relations_and_logic(relation: Any, expected: list[int]) -> None:
     indicator = sp.Piecewise((1, relation), (0, True))
     assert [value(indicator, at, 2) for at in (1, 2, 3)] == expected
-
-
-def test_a_power_of_an_absolute_value_is_one_of_the_square() -> None:
-    """SymPy turns (x^2)^(1/3) into |x|^(2/3): no branch may come of that."""
-    power = lowered((x**2) ** sp.Rational(1, 3))
-    assert not any(n.op is Op.BRANCH for n in reachable([power]))
-    assert value((x**2) ** sp.Rational(1, 3), -8.0, 1.0) == pytest.approx(4.0, rel=1e-15)
-
-
-def test_a_condition_on_a_branch_is_a_condition() -> None:
-    """SymPy turns it into an if-then-else of conditions, some of them decided."""
-    inner = sp.Piecewise((x, y > 1), (y**2, True))
-    outer = sp.Piecewise((sp.Integer(1), inner <= 4), (sp.Integer(0), True))
-    decided = sp.Piecewise((sp.Integer(1), sp.Piecewise((x, y > 1), (7, True)) <= 4), (0, True))
-    assert outer.has(sp.ITE)
-    assert [value(outer, *at) for at in ((3, 2), (5, 2), (5, -1), (3, -3))] == [1, 0, 1, 0]
-    assert [value(decided, *at) for at in ((3, 2), (5, 2), (3, 0))] == [1, 0, 0]
-
-
-def test_extrema_and_absolute_value() -> None:
-    for at in ((1, 2), (2, 1), (-3, -3), (0, -1)):
-        assert value(sp.Max(x, y), *at) == max(at)
-        assert value(sp.Min(x, y), *at) == min(at)
-        assert value(sp.Max(-x, 0, y), *at) == max(-at[0], 0, at[1])
-        assert value(sp.Abs(x - y), *at) == abs(at[0] - at[1])
-    assert lowered(sp.Max(x, y)).op is Op.BRANCH
-    assert lowered(sp.Abs(x)).op is Op.BRANCH
 
 
 # ----------------------------------------------------------------------------------------- errors
@@ -250,21 +153,6 @@ def test_a_model_without_a_potential_is_refused() -> None:
         m.finish()
 
 
-def test_unknowns_come_before_the_interpolated_field() -> None:
-    m = model()
-    m.interpolated("p")
-    with pytest.raises(ModelError, match="declare u before the interpolated p"):
-        m.unknown("u")
-
-
-def test_an_interpolated_field_is_declared_once() -> None:
-    m = model()
-    m.interpolated("p")
-    m.interpolated("q")
-    with pytest.raises(ModelError, match="the name p is used twice in model throwaway"):
-        m.interpolated("p")
-
-
 def test_decimals_are_what_they_are_written_as() -> None:
     assert lowered(x * 0.1) is not None
     half, one, other = sp.Rational(1, 2), sp.Rational(1, 10), sp.Rational(-37, 10**9)
@@ -312,13 +200,6 @@ def test_errors_name_file_and_line_of_the_page() -> None:
         m.define("g", sp.gamma(u))  # the line that is named
     place = f"{__file__}:{line_of('the line that ' + 'is named')}: "
     assert str(failed.value).startswith(place)
-
-
-def test_errors_inside_helpers_name_the_line_of_the_page() -> None:
-    m = model()
-    m.coordinates("X")
-    with pytest.raises(ModelError, match=f"test_lower.py:{line_of('# a helper ' + 'fails')}: "):
-        kin.isoparametric(m, [[sp.Symbol("strange")]], [(1,)])  # a helper fails
 
 
 def test_what_is_never_used_is_named_where_it_was_declared() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,10 @@ import pytest
 import sympy as sp
 
 from softehl.codegen.elements import quadrature
-from softehl.codegen.language import named_symbols, sympy_lowering, weak_form
+from softehl.codegen.language import named_symbols, weak_form
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import model_loader, user_kernels
 
 x = sp.Symbol("x", real=True)
 PLAIN = ((1 + x) ** 2, (1 + x) ** 3)
@@ -156,69 +154,7 @@ def test_names_of_two_models_are_different() -> None:
         one.m.define("mixed", other)
 
 
-def test_a_chain_of_many_names_is_differentiated() -> None:
-    m = Model("chain", nodes=1, rule=quadrature.point_rule())
-    a = u = m.unknown("u")
-    for k in range(500):
-        a = m.define(f"a_{k}", a + u / 500)
-    assert number(sp.diff(a, u).subs(u, x)) == pytest.approx(2.0)
-
-
-def test_the_slope_of_an_interpolated_field() -> None:
-    m = Model("film", nodes=2, rule=quadrature.gauss(2, 1))
-    p, p_xi = m.interpolated("p")
-    (xi,) = m.point()
-    assert sp.diff(p**2, xi) == 2 * p * p_xi
-    with pytest.raises(ModelError, match="derivative by xi meets p_xi"):
-        sp.diff(p_xi, xi)
-
-
 # --------------------------------------------------------------------------- the check of a page
-
-BAR = """
-import sympy as sp
-from softehl import Definition, Model, quadrature
-
-def bar() -> Definition:
-    m = Model("bar", nodes=2, rule=quadrature.gauss(2, 1), unroll=True, doc="A bar.")
-    (X,) = m.coordinates("X")
-    (u,) = m.nodal_unknowns("u")
-    (mu,) = m.parameters(mu="modulus")
-    L = m.define("L", X[1] - X[0])
-    lam = m.define("lam", 1 + (u[1] - u[0]) / L)
-    I1 = m.define("I1", lam**2 + 2 / lam)
-    W = mu * (I1 + lam**3 - 4) / 2
-    m.weak_form([(sp.diff(W, lam) * L / 2, lam)])
-    return m.finish()
-"""
-
-
-def test_the_check_reads_a_page_with_its_names_written_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """With symbols to which SymPy is blind the page is wrong, and its oracle must not be."""
-    path = tmp_path / "bar.py"
-    path.write_text(BAR)
-    monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "right"))
-    assert user_kernels.generate([path]) == 0
-
-    def blind(label: str, value: Any, **how: Any) -> Any:
-        seen = named_symbols._WRITTEN.get()
-        return named_symbols.named(label, value, **how) if seen else sp.Symbol(label, real=True)
-
-    monkeypatch.setattr(sympy_lowering, "named", blind)
-    monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "wrong"))
-    assert user_kernels.generate([path]) == 1
-    printed = capsys.readouterr().err
-    assert "bar: residual is off by" in printed
-    assert "bar: tangent is off by" in printed
-
-
-def test_a_page_that_cannot_be_written_out_is_compared_with_itself(tmp_path: Path) -> None:
-    path = tmp_path / "odd.py"
-    path.write_text(BAR.replace("W = mu", "I1.name\n    W = mu"))
-    assert model_loader.written_out(path) == {}
-    assert [d.name for d in model_loader.definitions(path)] == ["bar"]
 
 
 def test_the_inverse_of_a_matrix_of_a_page_is_written_out() -> None:

@@ -13,12 +13,9 @@ import sympy as sp
 import softehl
 from softehl.codegen import pipeline
 from softehl.codegen.elements import quadrature
-from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.fields import Fields
-from softehl.codegen.language.material import Law, Material, material
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build, output_files
-from softehl.codegen.tools.model_text import ModelFileError
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
 ROOT = sp.Rational(1, 2)
@@ -165,44 +162,3 @@ def test_a_guarded_division_by_zero_at_a_point_of_the_rule() -> None:
     x = 0.6**0.5
     total = 2 * (10 / 9 * np.sin(x) / x + 8 / 9)
     assert -kernel.residual(X, np.zeros((1, 4))).sum() == pytest.approx(total, rel=1e-14)
-
-
-def neither(m: Material) -> None:
-    m.parameters(mu="modulus")
-
-
-def flat(m: Material) -> None:
-    (mu,) = m.parameters(mu="modulus")
-    m.stress(mu * m.F[:2, :2])
-
-
-def two(m: Material, n: Any) -> None:
-    m.energy(m.F.det())
-
-
-def raw(m: Material) -> None:
-    m.energy(m.F + 1)
-
-
-def unused(m: Material) -> None:
-    mu, _ = m.parameters(mu="modulus", K="modulus")
-    m.energy(mu * m.F.det())
-
-
-@pytest.mark.parametrize(
-    ("law", "line", "words"),
-    [
-        (neither, 0, "neither m.energy"),
-        (flat, 2, r"stress has shape \(2, 2\)"),
-        (two, 0, r"write `def two\(m\):`"),
-        (raw, 1, "unsupported operand"),
-        (unused, 1, "K is never used"),
-    ],
-)
-def test_errors_of_a_material_name_its_own_line(
-    law: Callable[..., None], line: int, words: str
-) -> None:
-    made: Law = material(law)
-    where = f"{Path(__file__).name}:{law.__code__.co_firstlineno + line}: "
-    with pytest.raises((ModelError, ModelFileError), match=where + ".*" + words):
-        softehl.load_kernel(made, cell="hex8")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +12,6 @@ import pytest
 import sympy as sp
 
 from softehl.codegen.elements import quadrature
-from softehl.codegen.graph.differentiation import gradient
-from softehl.codegen.graph.evaluation import State
-from softehl.codegen.graph.graph import Op
-from softehl.codegen.graph.routines import Isotropic, upper
-from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
@@ -238,22 +232,6 @@ def test_local_unknowns_of_a_stretch(tmp_path: Path) -> None:
             assert abs(found / ((first(x) - first(y)) / (x - y)) - 1) < 1e-14, (a, b)
 
 
-def test_an_invariant_that_is_the_same_for_both_needs_no_quotient(tmp_path: Path) -> None:
-    """A condition on J is decided once: where its rounding decides, at J = 1, nothing is lost."""
-    kernel = of_stretches("volume", lambda a, b, c: sp.Max(a * b * c - 1, 0) ** 2, tmp_path)
-    for a in (1.1, 1.3, 0.7, 1.0):
-        for gap in (0.0, 1e-15, 1e-12):
-            found, x, y = shear(kernel, a, a * (1 + gap), 1 / a**2)
-            J = mpmath.sqrt(x * y * np.square(1 / a**2))
-            assert abs(found + max(J - 1, 0) * J / (x * y)) < 1e-15
-
-
-def test_order_of_the_second_derivatives() -> None:
-    pairs = [(i, j) for i in range(6) for j in range(i, 6)]
-    assert [upper(i, j) for i, j in pairs] == list(range(21))
-    assert upper(4, 2) == upper(2, 4)
-
-
 def test_what_is_no_isotropic_energy_is_refused() -> None:
     with pytest.raises(ModelError, match="W: the energy changes when two stretches are exchanged"):
         stretches(lambda x, y, z: x + 2 * y + z)
@@ -309,20 +287,3 @@ def test_the_derivative_by_a_matrix_is_symmetric(tmp_path: Path) -> None:
     np.testing.assert_allclose(kernel.residual(*at).reshape(3, 3), 4 * F_at @ right, atol=1e-13)
     checked = verification.check(d, ("residual", "fields"), tmp_path / build.LIBRARY, seconds=1)
     assert max(checked.errors.values()) <= verification.BOUND
-
-
-def test_derivatives_of_the_oracle_are_differences() -> None:
-    """Orders 1 and 2 in 90 digits against trace(C^2), whose derivatives are 2 C and a constant."""
-    d = stretches(lambda x, y, z: x**4 + y**4 + z**4)
-    (call,) = (n for n in reachable([d.potential]) if n.op is Op.CALL)
-    assert isinstance(call.payload, Isotropic)
-    first = gradient(d.graph, d.potential, d.directions)
-    C = turned(1.3, 1.3, 0.8)
-    at = element_state_of(C)
-    for k, u in enumerate(d.directions):
-        value = Oracle(replace(d, potential=first[u])).potential(at)
-        assert abs(value - 2 * unknowns(C)[k] * (1 if k < 3 else 2)) < 1e-20
-
-
-def element_state_of(C: Array) -> State:
-    return State((), unknowns(C), (), PARAMETERS)

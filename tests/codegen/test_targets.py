@@ -93,10 +93,3 @@ def test_generate_writes_a_complete_folder_of_scalar_c(
     assert cli.generate(target="scalar", out=tmp_path) == 0
     build.build(tmp_path, extra=("-O0",))
     assert load_kernel("contact", tmp_path).tasks == ("residual", "tangent", "pseudo_load")
-
-
-def test_another_target_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.generate(target="ufcx") == 2
-    assert capsys.readouterr().err == (
-        "softehl: generated/ holds target simd only, give --out FOLDER for target ufcx\n"
-    )

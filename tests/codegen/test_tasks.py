@@ -19,7 +19,7 @@ from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.verify.graph_oracle import Oracle
 from softehl.runtime.discretisation.quadrature import film_rule, several
-from softehl.runtime.kernels.kernel import ArgumentError, Kernel
+from softehl.runtime.kernels.kernel import Kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors
 
 X = np.array([[0.1, 0.0, 1.1, 0.2, 0.9, 1.0, -0.1, 0.9]])
@@ -84,30 +84,6 @@ def test_derivatives_by_arguments(name: str, array: str, index: int, family: Any
     assert off(found, wrong) > 1e-3
 
 
-def test_batches_shapes_and_kinds_of_the_further_tasks(
-    family: Any, rng: np.random.Generator
-) -> None:
-    _, kernel = family
-    n = 6
-    x, u, v = X + rng.uniform(-0.02, 0.02, (n, 8)), np.repeat(U, n, 0), rng.normal(size=(n, 8))
-    data = np.repeat(GIVEN["data"], n, 0)
-    named = {"parameters": [0.8], "data": data}
-    together = kernel.product(x, u, v, **named), kernel.derivative("X3", x, u, **named)
-    assert all(a.shape == (n, 8) and a.dtype == np.float64 for a in together)
-    for e in range(n):
-        one = {"parameters": [0.8], "data": data[:1]}
-        s = slice(e, e + 1)
-        np.testing.assert_array_equal(together[0][e], kernel.product(x[s], u[s], v[s], **one)[0])
-        np.testing.assert_array_equal(together[1][e], kernel.derivative("X3", x[s], u[s], **one)[0])
-    for wrong in (v[:1], v[:, :7], v.ravel()):
-        with pytest.raises(ArgumentError, match=r"direction has shape .*, must be \(6, 8\)"):
-            kernel.product(x, u, wrong, **named)
-    with pytest.raises(ArgumentError, match="direction holds complex128"):
-        kernel.product(x, u, v + 1j, **named)
-    with pytest.raises(ArgumentError, match=r"quad offers .* d_mu, .*, not d_X1"):
-        kernel.derivative("X1", x, u, **named)
-
-
 def test_product_of_an_interpolated_field(tmp_path: Path) -> None:
     m = Model("field", nodes=1, rule=quadrature.gauss(2, 1))
     u = m.unknown("u")
@@ -125,37 +101,6 @@ def test_product_of_an_interpolated_field(tmp_path: Path) -> None:
     assert off(found, Oracle(d).product(at, v[0].tolist())) <= 1e-14
     slope = kernel.derivative("k", np.zeros((1, 0)), dofs, **given)[0]
     assert off(slope, Oracle(d).derivative(at, "parameters", 0)) <= 1e-14
-
-
-def two_fields() -> Definition:
-    """A pressure of order 2 and a temperature of order 1 that know each other."""
-    m = Model("two_fields", nodes=1, rule=quadrature.gauss(3, 1))
-    u = m.unknown("u")
-    p, p_xi = m.interpolated("p")
-    T, T_xi = m.interpolated("T")
-    (k,) = m.parameters(k="conductivity")
-    m.weak_form([(p_xi * sp.exp(-T), p_xi), (k * T_xi + u * p**2, T_xi), (p * T, u)])
-    m.fields(product=p * T_xi)
-    return m.finish()
-
-
-def test_two_interpolated_fields(tmp_path: Path) -> None:
-    d = two_fields()
-    kernel = compiled(d, tmp_path)
-    rule = several(film_rule(2, "gauss", 3), film_rule(1, "gauss", 3))
-    assert rule.basis is not None
-    assert rule.basis.shape == (3, 5, 4)
-    dofs = np.array([[0.7, 0.3, 0.9, -0.2, 1.1, 0.4]])
-    given: dict[str, Any] = {"parameters": [1.4], "rule": rule}
-    at = element_state(kernel, (), dofs, **given)
-    r, K = kernel.tangent(np.zeros((1, 0)), dofs, **given)
-    assert off(r[0], Oracle(d).residual(at)) <= 1e-14
-    assert off(K[0], Oracle(d).tangent(at)) <= 1e-14
-    xi = rule.points[:, 0]
-    p = 0.3 * xi * (xi - 1) / 2 + 0.9 * (1 - xi**2) - 0.2 * xi * (xi + 1) / 2
-    expected = p * 0.5 * (0.4 - 1.1)
-    found = kernel.fields_at(np.zeros((1, 0)), dofs, **given)[0, :, 0]
-    np.testing.assert_allclose(found, expected, rtol=1e-13)
 
 
 def test_fields_on_different_points_are_refused() -> None:
@@ -220,6 +165,27 @@ def test_what_cannot_be_offered_is_named(asked: dict[str, Any], message: str) ->
 
 # ------------------------------------------------------------------------------------- functions
 
+
+@pytest.mark.parametrize(
+    ("clamp", "slope"),
+    [
+        (lambda x, c: sp.Max(-c, sp.Min(x, c)), 1.0),
+        (lambda x, c: sp.sign(x) * sp.Min(sp.Abs(x), c), 0.0),
+    ],
+)
+def test_the_slope_of_a_clamp_at_zero(
+    clamp: Callable[[Any, Any], Any], slope: float, tmp_path: Path
+) -> None:
+    """What docs/language.md says of kinks: `sign(0)` is 0, and so is the slope of the product."""
+    m = Model("clamp", nodes=1, rule=quadrature.point_rule())
+    x = m.unknown("x")
+    (c,) = m.parameters(c="limit")
+    m.weak_form([(clamp(x, c), x)])
+    kernel = compiled(m.finish(), tmp_path, "-O0")
+    _, K = kernel.tangent(np.empty((1, 0)), np.zeros((1, 1)), parameters=[0.5])
+    assert K.item() == slope
+
+
 FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
     "circular": lambda x, y: sp.tan(x) * sp.asin(x) - sp.acos(y / 3) ** 2 + sp.atan(x * y),
     "hyperbolic": lambda x, y: sp.sinh(x) * sp.cosh(y) + sp.tanh(x * y) * x,
@@ -243,43 +209,3 @@ def test_functions_and_their_derivatives(name: str, unroll: bool, tmp_path: Path
     kernel = compiled(d, tmp_path)
     for at in ((0.4, -0.7), (-0.3, 0.2), (0.6, 0.5)):
         assert max(tangent_errors(d, kernel, (), at, parameters=[0.3])) <= 1e-14
-
-
-def test_the_length_of_a_vector_and_its_derivatives(tmp_path: Path) -> None:
-    """Also where it is zero: there they are zero; the plain root has none (not-a-number)."""
-    m = Model("length", nodes=1, rule=quadrature.point_rule())
-    s = [m.unknown("x"), m.unknown("y")]
-    m.potential(m.integral("Pi", m.norm(s) ** 3 + m.norm(s) * sp.exp(s[0])))
-    d = m.finish()
-    kernel = compiled(d, tmp_path)
-    for at in ((0.4, -0.7), (-3e-9, 2e-9)):
-        assert max(tangent_errors(d, kernel, (), at)) <= 1e-14
-    r, K = kernel.tangent(np.zeros((1, 0)), np.zeros((1, 2)))
-    assert not r.any()
-    assert not K.any()
-    m = Model("root", nodes=1, rule=quadrature.point_rule())
-    s = [m.unknown("x"), m.unknown("y")]
-    m.potential(m.integral("Pi", sp.sqrt(s[0] ** 2 + s[1] ** 2)))
-    (tmp_path / "root").mkdir()
-    r = compiled(m.finish(), tmp_path / "root").residual(np.zeros((1, 0)), np.zeros((1, 2)))
-    assert np.isnan(r).all()
-
-
-@pytest.mark.parametrize(
-    ("clamp", "slope"),
-    [
-        (lambda x, c: sp.Max(-c, sp.Min(x, c)), 1.0),
-        (lambda x, c: sp.sign(x) * sp.Min(sp.Abs(x), c), 0.0),
-    ],
-)
-def test_the_slope_of_a_clamp_at_zero(
-    clamp: Callable[[Any, Any], Any], slope: float, tmp_path: Path
-) -> None:
-    """What docs/language.md says of kinks: `sign(0)` is 0, and so is the slope of the product."""
-    m = Model("clamp", nodes=1, rule=quadrature.point_rule())
-    x = m.unknown("x")
-    (c,) = m.parameters(c="limit")
-    m.weak_form([(clamp(x, c), x)])
-    kernel = compiled(m.finish(), tmp_path, "-O0")
-    _, K = kernel.tangent(np.empty((1, 0)), np.zeros((1, 1)), parameters=[0.5])
-    assert K.item() == slope

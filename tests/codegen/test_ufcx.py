@@ -6,7 +6,6 @@ are those that `test_oracle.py` holds against 90 digits.
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +15,8 @@ from hypothesis import given
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, TargetError
-from softehl.codegen.elements import quadrature
 from softehl.codegen.emit import ufcx as emit_ufcx
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
 from softehl.codegen.verify import random_states
 from softehl.runtime.arrays import Array
@@ -154,38 +151,6 @@ def test_the_comparison_sees_a_wrong_order_of_vertices(
 # -------------------------------------------------------------- what the shipped ones do not have
 
 
-def looped() -> Definition:
-    """A loop that stays a loop, data, a parameter derivative, a nodal and a free unknown."""
-    m = Model("looped", nodes=2, rule=quadrature.gauss(3, 1), unroll=False)
-    X = m.coordinates("Z", "R")
-    (u,) = m.nodal_unknowns("u")
-    lam = m.unknown("lambda")
-    (c,) = m.data(c="constant of the element")
-    (k,) = m.parameters(k="stiffness")
-    (xi,) = m.point()
-    a = m.define("a", u[0] * (1 - xi) + u[1] * (1 + xi) + c * X[1][0], interface=True)
-    mean = m.integral("mean", a**2 + X[0][1])
-    m.potential(m.integral("Pi", k * (a - mean) ** 4) + lam * mean)
-    m.offer(derivatives=[k])
-    return m.finish()
-
-
-def test_loops_keep_their_rule_in_a_table(tmp_path: Path) -> None:
-    kernels, batch = cell_kernels(looped(), tmp_path), compiled(looped(), tmp_path)
-    X, u, c, k = [0.2, 1.4, 0.9, 1.1], [0.4, 0.37, -0.8], [0.7], [2.5]
-    given: dict[str, Any] = {"data": [c], "parameters": k}
-    R, K = batch.tangent(np.array([X]), np.array([u]), **given)
-    slope = batch.derivative("k", np.array([X]), np.array([u]), **given)
-    vertices = [*X[:2], np.nan, *X[2:], np.nan]
-    for task, expected in (("residual", R), ("tangent", K), ("d_k", slope)):
-        A = np.zeros(expected.shape[1:])
-        kernels.add(task, A, [*u, *c], k, vertices)
-        assert close(A, expected[0])
-    text = (tmp_path / "looped_ufcx.c").read_text()
-    assert "static const double rule[] = {" in text
-    assert "q < 3" in text
-
-
 def test_an_interpolated_field_is_refused() -> None:
     with pytest.raises(TargetError, match=r"film interpolates p .* use simd or scalar"):
         pipeline.compile_model(ALL["film"](), Target.UFCX)
@@ -194,25 +159,6 @@ def test_an_interpolated_field_is_refused() -> None:
 def test_products_and_sensitivities_are_not_offered() -> None:
     tasks = pipeline.compile_model(ALL["solid_q4"](), Target.UFCX).functions
     assert list(tasks) == ["energy", "residual", "tangent", "fields"]
-
-
-def hexahedron() -> Definition:
-    """Eight nodes in space, the lower face counterclockwise, then the upper one."""
-    m = Model("brick", nodes=8, rule=quadrature.gauss(2, 3))
-    X = m.coordinates("X", "Y", "Z")
-    (u,) = m.nodal_unknowns("u")
-    m.potential(sum(x * y**3 for x, y in zip(X[2], u, strict=True)))
-    return m.finish()
-
-
-def test_the_vertices_of_a_hexahedron() -> None:
-    d = hexahedron()
-    assert emit_ufcx.vertices(d) == (0, 1, 3, 2, 4, 5, 7, 6)
-    text = pipeline.compile_model(d, Target.UFCX).text
-    for node, vertex in enumerate((0, 1, 3, 2, 4, 5, 7, 6)):
-        assert f" * w[{vertex}]  u{node + 1}\n" in text
-        assert f"coordinate_dofs[{3 * vertex + 2}]" in text
-    assert not re.search(r"coordinate_dofs\[\d*[^258\d]\]", text)
 
 
 def test_local_unknowns_and_data_of_points(tmp_path: Path) -> None:

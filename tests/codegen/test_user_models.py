@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import softehl
-from softehl.codegen.tools import cache_dir, cli, kernel_cache, model_loader, model_text
+from softehl.codegen.tools import kernel_cache, model_loader
 from softehl.codegen.tools import user_kernels as cli_files
 from softehl.codegen.tools.build import DIGEST, LIBRARY
 from softehl.codegen.tools.model_text import ModelFileError
-from softehl.codegen.verify import comparison, verification
+from softehl.codegen.verify import verification
 from softehl.runtime.kernels.kernel import ArgumentError, MissingKernelsError, StaleKernelsError
 
 SPRING = """
@@ -162,26 +162,6 @@ def test_running_a_model_leaves_no_trace() -> None:
     assert not Path("__pycache__").exists()
 
 
-def test_sources_are_the_file_and_what_it_imports_from_its_folder() -> None:
-    model_file("import sympy\nfrom b import x\nimport pack.inner\nif 0:\n    import late\n", "a.py")
-    model_file("from c import *\nx = 1\n", "b.py")
-    model_file("import a\n", "c.py")
-    model_file("", "pack/__init__.py")
-    model_file("from . import beside\nfrom .beside import y\n", "pack/inner.py")
-    model_file("y = 1\n", "pack/beside.py")
-    model_file("", "late.py")
-    model_file("", "unrelated.py")
-    expected = ["a.py", "b.py", "c.py", "late.py"]
-    expected += ["pack/__init__.py", "pack/beside.py", "pack/inner.py"]
-    assert list(model_text.sources(Path("a.py"))) == expected
-    before = model_text.sources(Path("a.py"))
-    model_file("y = 2\n", "pack/beside.py")
-    assert model_text.sources(Path("a.py")) != before
-    model_file("y = 1\n", "pack/beside.py")
-    model_file("z = 1\n", "unrelated.py")
-    assert model_text.sources(Path("a.py")) == before
-
-
 # ------------------------------------------------------------------------------- the command line
 
 
@@ -209,18 +189,6 @@ def test_generate_writes_compiles_and_checks(capsys: pytest.CaptureFixture[str])
     again = capsys.readouterr().out
     assert "0 of them new or changed" in again
     assert again.count("cached") == 4
-
-
-def test_several_files_go_apart_or_together() -> None:
-    model_file(spring("a"), "a.py")
-    model_file(spring("b"), "b.py")
-    assert run("a.py", "b.py") == 0
-    assert Path("generated/a/a.c").exists()
-    assert Path("generated/b/b.c").exists()
-    assert run("a.py", "b.py", "--out", "both") == 0
-    assert {"a.c", "b.c"} < {p.name for p in Path("both").iterdir()}
-    model_file(spring("a"), "b.py")
-    assert run("a.py", "b.py", "--out", "both") == 2
 
 
 def test_check_names_what_is_stale_and_writes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
@@ -261,20 +229,6 @@ def test_a_renamed_model_leaves_nothing_behind_and_files_of_others_are_left_alon
     assert run("mine.py", "--out", "own") == 2
     assert "own holds solver.c, which softehl did not write" in capsys.readouterr().err
     assert [p.name for p in Path("own").iterdir()] == ["solver.c"]
-
-
-def test_trace_shows_the_passes_of_a_users_model(capsys: pytest.CaptureFixture[str]) -> None:
-    model_file(spring())
-    assert run("mine.py", "--trace", "spring") == 0
-    assert "spring tangent" in capsys.readouterr().out
-    assert run("mine.py", "--trace", "other") == 2
-    assert "no model 'other'; there are spring" in capsys.readouterr().err
-
-
-def test_out_needs_a_model(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("--out", "somewhere") == 2
-    assert "--out needs a MODEL.py" in capsys.readouterr().err
-    assert cli.generate(out=Path("somewhere")) == 2
 
 
 def test_a_failed_compilation_shows_the_command_and_the_compilers_words(
@@ -323,20 +277,6 @@ def test_a_wrong_kernel_is_caught_whichever_task_is_wrong(
         assert f"spring: {task} is off by" in capsys.readouterr().err
 
 
-def test_derivatives_that_a_page_gives_itself_are_not_compared(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    energy = "m.define('half', k * u**2 / 2, derivative={u: k * u / 3})"
-    model_file(spring(energy=energy))
-    assert run("mine.py") == 0
-    assert "spring gives derivatives of its own: residual and tangent" in capsys.readouterr().out
-
-
-def test_not_a_number_fails_the_check() -> None:
-    assert cli_files._judge("it", {"tangent": float("inf")}) == 1
-    assert comparison.finite(float("nan")) == float("inf")
-
-
 def test_a_model_far_from_its_domain_says_what_to_give(capsys: pytest.CaptureFixture[str]) -> None:
     energy = "m.integral('Pi', sp.log(m.define('slack', k - 40)) * u**2)"
     text = "import sympy as sp" + spring(energy=energy)
@@ -379,29 +319,6 @@ def test_a_value_that_is_not_a_number_names_its_quantity(
         assert f"spring: {task} is not a number: pow(.. nothing ..) has none" in printed
 
 
-def test_a_root_of_nothing_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    root = "m.define('root', sp.sqrt(m.define('nothing', sp.Min(u, 10) - u)))"
-    model_file("import sympy as sp" + spring(energy=f"{root} * k + u**2"))
-    assert run("mine.py") == 1
-    printed = capsys.readouterr().err
-    assert printed.startswith("softehl: spring: residual is not a number: pow(.. nothing ..) has")
-
-
-def test_a_local_iteration_without_a_solution_asks_for_an_example(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """The oracle takes 200 steps, the kernel 25 at most: here one, which is not enough."""
-    local = "m.implicit('s', lambda s: s**3 + s - k - u, start=5, iterations=ITERATIONS)"
-    text = spring(energy=f"{local} ** 2")
-    model_file(text.replace("ITERATIONS", "1"))
-    assert run("mine.py") == 2
-    printed = capsys.readouterr().err
-    assert "its local iteration finds no solution at random states" in printed
-    assert "m.example(k=...)" in printed
-    model_file(text.replace("ITERATIONS", "25"))
-    assert run("mine.py") == 0
-
-
 # ------------------------------------------------------------------------------------- loading
 
 
@@ -419,24 +336,6 @@ def test_a_model_file_is_loaded_and_follows_its_text(capsys: pytest.CaptureFixtu
         kernel.residual(X, np.zeros((2, 2)), parameters=[1.0])
     with pytest.raises(ArgumentError, match="dofs holds complex128, must be real numbers"):
         kernel.residual(X, np.full((2, 1), 1j), parameters=[1.0])
-
-
-def test_an_imported_file_that_changes_is_noticed() -> None:
-    X, u = np.zeros((1, 1)), np.ones((1, 1))
-    model_file("FACTOR = 3\n", "constants.py")
-    model_file("from constants import FACTOR\n" + spring(energy="FACTOR * k * u"))
-    assert softehl.load_kernel("mine.py").residual(X, u, parameters=[1.0]) == 3.0
-    model_file("FACTOR = 5\n", "constants.py")
-    assert softehl.load_kernel("mine.py").residual(X, u, parameters=[1.0]) == 5.0
-
-
-def test_one_of_several_models_is_named() -> None:
-    model_file(spring("a") + spring("b"))
-    assert softehl.load_kernel("mine.py", "b").name == "b"
-    with pytest.raises(MissingKernelsError, match="holds a, b: name one of them"):
-        softehl.load_kernel("mine.py")
-    with pytest.raises(MissingKernelsError, match="no kernel 'c'; there are a, b"):
-        softehl.load_kernel("mine.py", "c")
 
 
 def test_definitions_shipped_names_and_folders_are_loaded() -> None:
@@ -458,51 +357,4 @@ def test_definitions_shipped_names_and_folders_are_loaded() -> None:
         softehl.load_kernel("nothing")
 
 
-def test_equal_definitions_have_one_fingerprint_and_different_ones_differ() -> None:
-    texts = [spring(), spring(), spring(energy="k * u**2 / 3"), spring().replace("[N/mm]", "[N]")]
-    prints = [kernel_cache.fingerprint(model_loader.definitions(model_file(t))[0]) for t in texts]
-    assert prints[0] == prints[1]
-    assert len(set(prints)) == 3
-    assert cache_dir.root().name == "cache"
-
-
-def test_a_page_with_several_interpolated_fields_is_checked() -> None:
-    text = """
-from softehl import Definition, Model, quadrature
-
-def void_film() -> Definition:
-    m = Model("void_film", nodes=2, rule=quadrature.gauss(2, 1), doc="Pressure and void.")
-    m.coordinates("X")
-    (p, p_xi), (v, _), (w, _) = m.interpolated_sides("p", "v", "w")
-    (k,) = m.parameters(k="conductance")
-    m.weak_form([(k * p_xi * (1 - v) + w, p_xi), (p * v, v)])
-    return m.finish()
-"""
-    model_file(text)
-    assert run("mine.py") == 0
-
-
 # -------------------------------------------------------------------------------- pages of fields
-
-FLOW = """
-import softehl
-
-@softehl.page
-def flow(m):
-    T = m.scalar("T")
-    m.minimise(m.grad(T).dot(m.grad(T)) ** 2)
-"""
-
-
-def test_a_page_of_fields_is_generated_on_cells(capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(model_file(FLOW))
-    assert run(path) == 2
-    assert "say which, as in" in capsys.readouterr().err
-    assert run(path, "--cell", "hex9") == 2
-    assert "mine.py: no element 'hex9'; there are" in capsys.readouterr().err
-    assert run(path, "--cell", "tri3", "--cell", "quad4", "--geometry", "axisymmetric") == 0
-    assert "flow_quad4_axisymmetric: compared with its page" in capsys.readouterr().out
-    kernel = softehl.load_kernel("generated/mine", "flow", cell="tri3")
-    assert (kernel.name, kernel.cell) == ("flow_tri3_axisymmetric", "tri3")
-    assert run(path, "--cell", "tri3", "--trace", "flow_tri3") == 0
-    assert "form: whole element: about" in capsys.readouterr().out

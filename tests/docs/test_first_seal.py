@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.pages import Block, Reader, blocks
+from tests.docs.pages import Reader, blocks
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "first-seal.md").read_text(encoding="utf-8")
@@ -88,8 +88,3 @@ def test_a_number_that_is_wrong_is_noticed(tmp_path: Path, monkeypatch: pytest.M
         (tmp_path / "results/a/curve.csv").write_text(head + wrong)
         with pytest.raises(AssertionError):
             assert_shown(table)
-
-
-def test_a_file_without_a_name_is_noticed(tmp_path: Path) -> None:
-    with pytest.raises(AssertionError, match="no block of kind 'toml'"):
-        Reader(tmp_path).read(Block("toml", "", "x = 1\n", 1))

@@ -9,7 +9,7 @@ import pytest
 
 from softehl.runtime.discretisation import quadrature
 from softehl.runtime.kernels.kernel import Rule
-from tests.reference.calling import Part, assemble, fitted_order, solve
+from tests.reference.calling import Part, fitted_order, solve
 from tests.reference.slider import ROD, Slider
 
 MESHES = {1: (16, 32, 64), 2: (16, 32, 64), 3: (8, 16, 32), 4: (8, 16, 32), 5: (8, 12, 20)}
@@ -132,22 +132,6 @@ def test_element_mean_flux_is_constant_along_the_film(m_p: int, kind: quadrature
     assert np.ptp(film.element_flux()) > 1e-6 * abs(flux.mean())
 
 
-def test_instroke_is_the_mirror_image_of_outstroke() -> None:
-    out = Slider()
-    back = Slider(h1=out.h2, h2=out.h1, speed=-out.speed)
-    one, other = solved(out, 6, 3), solved(back, 6, 3)
-    scale = np.abs(one.x[one.pressures]).max()
-    assert np.abs(one.x[one.pressures] - other.x[other.pressures][::-1]).max() < 1e-11 * scale
-    assert back.flux == pytest.approx(-out.flux)
-    assert other.element_flux().mean() == pytest.approx(back.flux, rel=1e-5)
-
-
-def test_penalty_is_silent_where_the_pressure_is_positive() -> None:
-    without, with_penalty = (solved(Slider(penalty=e), 8, 4) for e in (0.0, 1e4))
-    assert without.fields()["p"].min() > 0
-    np.testing.assert_array_equal(without.x, with_penalty.x)
-
-
 def test_a_wrong_oil_wedge_or_law_loses_the_order() -> None:
     """The oracle must notice one per cent of viscosity, a missing Barus term, a shifted gap."""
     for exact in (Slider(viscosity=6.59e-8 * 1.01), Slider(alpha=0.02), Slider(h2=0.00501)):
@@ -175,22 +159,6 @@ def test_cavitated_diverging_wedge_sits_at_the_penalty_pressure(kind: quadrature
     assert np.abs(free["p"][inner] / plateau - 1).min() > 1
 
 
-def test_tractions_of_the_slider_balance_and_match_their_integrals() -> None:
-    """Forces on the seal from the fields: radial 2 pi r p dx, axial 2 pi r (p dr - tau ds)."""
-    slider = Slider()
-    film = solved(slider, 24, 4)
-    total, _ = assemble([film.part], film.x)
-    values = film.fields()
-    count = 2 * (24 + 1)
-    ring = 2 * np.pi * (ROD + values["h"]) * values["dx"]
-    slope = (slider.h2 - slider.h1) / slider.length
-    assert total[1:count:2].sum() == pytest.approx(-(ring * values["p"]).sum(), rel=1e-12)
-    axial = (ring * (values["p"] * slope - values["tau"] * np.hypot(1, slope))).sum()
-    assert total[0:count:2].sum() == pytest.approx(axial, rel=1e-12)
-    # the wedge is thin: sum of the pressure forces is 2 pi R_rod times the load, up to h / R
-    assert -total[1:count:2].sum() == pytest.approx(2 * np.pi * ROD * slider.load(), rel=1e-3)
-
-
 def test_shear_on_seal_and_rod_matches_the_closed_form() -> None:
     """(17) on both walls: tau_rod - tau = h dp/dx, tau_rod + tau = 2 eta U / h."""
     slider = Slider()
@@ -206,45 +174,3 @@ def test_shear_on_seal_and_rod_matches_the_closed_form() -> None:
     friction = slider.viscosity * slider.speed * length * np.log(slider.h1 / slider.h2)
     mean = ((values["tau"] + values["tau_rod"]) / 2 * values["dx"]).sum()
     assert mean == pytest.approx(friction, rel=1e-10)
-
-
-def test_weights_scale_the_tractions_and_leave_the_reynolds_rows() -> None:
-    film = solved(Slider(alpha=0.02), 5, 2)
-    full, _ = assemble([film.part], film.x + 1e-3)
-    count = 2 * (5 + 1)
-    results = {}
-    for force, shear in ((0.3, 1.0), (1.0, 0.0)):
-        parameters = [*film.part.parameters[:5], force, shear]
-        part = Part("film", film.part.coordinates, film.part.maps, parameters, rule=film.part.rule)
-        results[force, shear], _ = assemble([part], film.x + 1e-3)
-        np.testing.assert_array_equal(results[force, shear][count:], full[count:])
-    np.testing.assert_allclose(results[0.3, 1.0][:count], 0.3 * full[:count], rtol=1e-13)
-    np.testing.assert_allclose(results[1.0, 0.0][1:count:2], full[1:count:2], rtol=1e-13)
-    assert np.abs(results[1.0, 0.0][0:count:2] - full[0:count:2]).max() > 1e-6
-
-
-def resisting(degrees: float, length: float = 1e-3) -> float:
-    """Flux between the ends of a segment at a slope for a unit difference of pressures, U = 0."""
-    middle, half = 0.02, 0.5 * length * np.array([np.cos(a := np.radians(degrees)), np.sin(a)])
-    nodes = np.array([[-half[0], ROD + middle - half[1], half[0], ROD + middle + half[1]]])
-    parameters = (ROD, 0.0, 1e-8, 0.0, 0.0, 0.0, 0.0)
-    part = Part("film", nodes, np.arange(6)[None], parameters, rule=quadrature.film_rule(1))
-    rows, _ = part.elements(np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]))
-    return -float(rows[0, 4])
-
-
-def test_a_gentle_segment_is_as_long_as_the_rod_says() -> None:
-    """Along the rod its length is the cosine's, but for the tenth power of its slope."""
-    for degrees in (1.0, 5.0, 10.0):
-        angle = np.radians(degrees)
-        wedge = 1.0 + (0.5e-3 * np.sin(angle) / 0.02) ** 2  # mean of h^3 over that of a level one
-        ratio = resisting(degrees) * np.cos(angle) / (wedge * resisting(0.0))
-        assert ratio == pytest.approx(1.0, abs=1e-6)
-
-
-def test_a_segment_on_a_wall_resists_like_any_other() -> None:
-    """Upright, and a little beyond, where its length along the rod is zero and negative."""
-    beyond = [resisting(a) for a in (80.0, 89.9, 90.0, 90.1, 100.0)]
-    assert min(beyond) > 0.0
-    assert max(beyond) < 1.2 * min(beyond)
-    assert beyond[2] == pytest.approx(resisting(0.0), rel=1e-3)

@@ -58,34 +58,6 @@ def test_it_moves_a_radial_force_from_node_to_node_and_nothing_else(order: int) 
     assert not tangents[:, silent].any()
 
 
-def test_it_is_linear_in_its_strength_and_in_the_weight_of_the_forces() -> None:
-    of = [
-        elements(np.random.default_rng(2), 4, **changes)
-        for changes in ({}, {"upwinding": -0.5}, {"force_weight": 0.2})
-    ]
-    for factor, (forces, tangents) in zip((1.0, -0.5, 0.25), of, strict=True):
-        np.testing.assert_allclose(forces, factor * of[0][0], rtol=1e-14)
-        np.testing.assert_allclose(tangents, factor * of[0][1], rtol=1e-13, atol=1e-15)
-
-
-@pytest.mark.parametrize("changes", [{"upwinding": 0.0}, {"rod_speed": 0.0}])
-def test_without_strength_or_speed_there_is_nothing_at_all(changes: dict[str, float]) -> None:
-    for values in elements(np.random.default_rng(3), 4, **changes):
-        assert not values.any()
-
-
-def test_pressures_without_bubbles_have_no_load() -> None:
-    """m_p = 1, and any linear pressure of a higher order: zero up to rounding."""
-    forces, tangents = elements(np.random.default_rng(4), 1)
-    scale = 2 * np.pi * ROD * 0.12 * 5  # the load of the whole pressure
-    assert np.abs(forces).max() < 1e-14 * scale
-    assert np.abs(tangents).max() < 1e-11 * scale  # by h, of 3 micrometres
-    for order in (2, 4, 7):
-        part, places = chain(np.linspace(0, 0.3, 4), np.full(4, 2e-3), order)
-        state = np.concatenate([np.zeros(8), 2 + 7 * places])
-        assert np.abs(part.elements(state)[0]).max() < 1e-14 * scale
-
-
 @pytest.mark.parametrize(
     ("speed", "strength", "downstream"), [(U, 1.0, 3), (-U, -1.0, 1)], ids=["out", "in"]
 )
@@ -100,19 +72,6 @@ def test_the_load_goes_downstream(speed: float, strength: float, downstream: int
     delta = peclet(0.1, 3e-4) ** 2 / (9 + peclet(0.1, 3e-4) ** 2)
     assert delta > 0.99
     assert forces[0, downstream] == pytest.approx(-load / 2 * delta, rel=1e-12)
-
-
-@pytest.mark.parametrize(("speed", "strength"), [(U, 1.0), (-U, -1.0)], ids=["out", "in"])
-def test_it_fades_where_the_film_widens_downstream(speed: float, strength: float) -> None:
-    """By 1 / (1 + (rise / (0.2 h_m))^2): to a half where h rises by a fifth of its mean."""
-    forces = []
-    for rise in (-0.2, 0.0, 0.2):
-        h = 3e-4 * (1 + np.array([-0.5, 0.5]) * rise * np.sign(speed))
-        part, _ = chain(np.array([0.0, 0.1]), h, 2, strength=strength, speed=speed)
-        forces.append(abs(part.elements(np.array([0.0, 0, 0, 0, 1.0, 1.5, 1.0]))[0][0, 3]))
-    narrowing, level, widening = forces
-    assert narrowing == pytest.approx(level, rel=1e-5)
-    assert widening == pytest.approx(level / 2, rel=1e-5)
 
 
 def smooth(count: int, thickness: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -4,36 +4,20 @@ from __future__ import annotations
 
 import warnings
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import sympy as sp
 from scipy.sparse import csc_array, diags_array
 
 import softehl
 from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.parallel import linear_solver_choice
-from softehl.runtime.sensitivity import linearised_step as linear
 from softehl.runtime.solve.eigen import Pivots
 from softehl.runtime.solve.linear import amg
-from softehl.runtime.solve.linear.amg import Entries
-from softehl.runtime.solve.linear.superlu import SuperLU
 from softehl.runtime.solve.solution import NotConverged
-
-HEAT = Path(__file__).parents[2] / "docs" / "models" / "heat_fields.py"
-
-
-@softehl.page
-def rubber(m: Any) -> None:
-    """Compressible neo-Hooke."""
-    u = m.vector("u")
-    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + K / 2 * (J - 1) ** 2)
+from tests.runtime.field_pages import rubber
 
 
 @softehl.page
@@ -167,21 +151,6 @@ def test_what_multigrid_cannot_take_is_refused() -> None:
         study.solve(linear="amg", newton=softehl.Newton())
 
 
-def test_a_linear_march_factorises_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    made, factorise = list[int](), SuperLU.factorise
-
-    def counted(self: SuperLU, K: Any) -> Any:
-        made.append(K.nnz)
-        return factorise(self, K)
-
-    monkeypatch.setattr(SuperLU, "factorise", counted)
-    study = softehl.Study(softehl.Mesh.rectangle(1, 1, cells=(4, 4)))
-    study.add("plate", HEAT, k=1.0, c=1.0)
-    study.fix("left", T=1)
-    assert len(list(study.march(dt=0.25, until=1, linear="superlu"))) == 4
-    assert len(made) == 1
-
-
 @pytest.mark.parametrize("pressed", [0.2, 0.4])
 def test_multigrid_tells_a_state_that_is_unstable(pressed: float) -> None:
     """A column held at both ends, before and beyond its first load."""
@@ -202,14 +171,6 @@ def test_multigrid_tells_a_state_that_is_unstable(pressed: float) -> None:
         assert "its energy falls along one direction at least (" in words[0]
 
 
-def test_stability_needs_no_factors_beside_multigrid(monkeypatch: pytest.MonkeyPatch) -> None:
-    def none(*_: Any) -> Any:
-        pytest.fail("factorised")
-
-    monkeypatch.setattr(Pivots, "of", none)
-    cube().solve(linear="amg")
-
-
 def test_modes_by_multigrid(monkeypatch: pytest.MonkeyPatch) -> None:
     """Those that factors find, equal ones as well, without any; a spring and a load are in them."""
     study, mass = cube(), {"rubber": {"rho": 2.0}}
@@ -222,36 +183,3 @@ def test_modes_by_multigrid(monkeypatch: pytest.MonkeyPatch) -> None:
     for one, other in zip(found, wanted, strict=True):
         assert one.norm() == pytest.approx(other.norm(), rel=1e-4)
     assert np.abs(found[0].x - wanted[0].x).max() < 1e-4 * np.abs(wanted[0].x).max()
-
-
-def test_entries_in_another_order() -> None:
-    """By numbers that are kept while the pattern is the same; an unsymmetric matrix is seen."""
-    random = np.random.default_rng(0)
-    dense = random.uniform(1, 2, (6, 6)) * (random.random((6, 6)) < 0.4)
-    order, even_now = random.permutation(6).astype(np.int64), dense + dense.T
-    nearly = even_now + 1e-6 * np.eye(6, k=1)
-    for matrix in (even_now, dense, np.tri(6), nearly):
-        K = csc_array(matrix)
-        entries = Entries.of(K, order, 2)
-        K.data *= 3.0
-        found, even = entries.taken(K)
-        assert found.blocksize == (2, 2)
-        np.testing.assert_array_equal(found.toarray(), 3.0 * matrix[order][:, order])
-        assert even == (matrix is even_now)
-        assert entries.fit(K)
-        assert not entries.fit(csc_array(np.eye(6)))
-
-
-def test_derivatives_after_multigrid_need_no_factors(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of symmetric tangents, and with air that carries heat."""
-    cases: list[tuple[Any, Any, dict[str, Any]]] = [
-        (cube, {"rubber": ["mu", "K"], "nodes": ["x"]}, {"what": "u_y", "at": (1, 1, 1)}),
-        (cube, {"rubber": ["mu", "K"], "nodes": ["x"]}, {"what": "u_x", "reaction": "left"}),
-        (stream, {"nodes": ["x"]}, {"what": "T", "at": (1, 0.5)}),
-    ]
-    wanted = [make().solve().sensitivity(by=by, **what) for make, by, what in cases]
-    monkeypatch.setattr(linear, "choose", None)
-    for (make, by, what), expected in zip(cases, wanted, strict=True):
-        slopes = make().solve(linear="amg").sensitivity(by=by, **what)
-        for key, slope in expected.items():
-            np.testing.assert_allclose(slopes[key], slope, rtol=1e-8, atol=1e-11)

@@ -121,14 +121,6 @@ def test_rows_and_columns_of_some_unknowns(rng: np.random.Generator) -> None:
     assert len(assembler.memo.crosses) <= 4
 
 
-def test_a_block_without_parameters_is_off_but_keeps_its_place(rng: np.random.Generator) -> None:
-    blocks, x = _blocks(rng), rng.normal(size=SIZE)
-    assembler = Assembler.build(SIZE, blocks)
-    r, K = assembler.linearise(x, {"a": PARAMETERS["a"]})
-    assert r == pytest.approx(Assembler.build(SIZE, blocks[:1]).residual(x, PARAMETERS))
-    assert K.nnz == assembler.pattern.nnz
-
-
 def test_misuse_is_refused(rng: np.random.Generator) -> None:
     blocks = _blocks(rng)
     with pytest.raises(ValueError, match="same name"):

@@ -10,11 +10,11 @@ import pytest
 import sympy as sp
 from scipy.special import ellipe, ellipk
 
-import softehl
 from softehl import Definition, Model, quadrature
 from softehl.runtime.analyses.bifurcation import MissedBifurcations, place
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.study import Study, StudyError
+from tests.runtime.field_pages import rubber_by_log as rubber
 from tests.runtime.test_follow import shallow
 from tests.runtime.touching_bodies import elastic
 
@@ -35,16 +35,6 @@ def column() -> Study:
     study = Study(Mesh.line(1.0, cells=1))
     study.add("link", link(), on=lambda x: x[:, 0] == 0.0, k=K, P=lambda t: t)
     return study
-
-
-@softehl.page
-def rubber(m: Any) -> None:
-    """Compressible neo-Hooke."""
-    u = m.vector("u")
-    mu, lame = m.parameters(mu="shear modulus", lame="Lame's first")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + lame / 2 * sp.log(J) ** 2)
 
 
 def far(result: Any) -> bool:
@@ -78,14 +68,6 @@ def resting() -> Study:
     study.fix("lower:bottom", u_x=0, u_y=0)
     study.load("upper:top", u_y=-0.05)
     return study
-
-
-def test_what_is_nearly_singular_is_looked_for_with_contact() -> None:
-    result = resting().solve()
-    sought = result.system.problem(result.system.still(1.0, result.x, {}))
-    found = place(sought, 1.0, result.x)
-    assert abs(found.value) > 1e-3  # without contact the block is free
-    assert found.value == pytest.approx(place(sought.at(result.x), 1.0, result.x).value)
 
 
 def test_a_path_that_cannot_see_bifurcations_says_so() -> None:
@@ -140,3 +122,11 @@ def test_what_is_refused() -> None:
     study = column()
     with pytest.raises(StudyError, match=r"detect = 'bifurcations': allowed are"):
         study.follow(step=0.5, until=lambda r: True, detect="bifurcations")  # type: ignore[arg-type]
+
+
+def test_what_is_nearly_singular_is_looked_for_with_contact() -> None:
+    result = resting().solve()
+    sought = result.system.problem(result.system.still(1.0, result.x, {}))
+    found = place(sought, 1.0, result.x)
+    assert abs(found.value) > 1e-3  # without contact the block is free
+    assert found.value == pytest.approx(place(sought.at(result.x), 1.0, result.x).value)

@@ -10,7 +10,6 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.solve.linear import superlu
-from softehl.runtime.solve.linear.elimination_ordering import Order
 from softehl.runtime.solve.linear.schur_complement import SchurByFactors, SchurBySolves
 from softehl.runtime.solve.linear.superlu import SuperLU
 
@@ -92,20 +91,6 @@ def test_an_order_serves_all_matrices_of_a_pattern(rng: np.random.Generator) -> 
     for k in range(10):
         solver.condense(first, BOUNDARY[k % 4 :])
         assert len(solver.orders.known) <= solver.orders.most
-
-
-def test_another_pattern_has_another_order(rng: np.random.Generator) -> None:
-    A = body(rng)
-    order = Order.of(A, np.arange(N)[::-1], BOUNDARY)
-    assert order.unknowns[-4:].tolist() == BOUNDARY.tolist()
-    assert order.arranged(A).toarray() == pytest.approx(
-        A.toarray()[np.ix_(order.unknowns, order.unknowns)]
-    )
-    other = body(rng).tolil()
-    other[0, 50] = 1.0
-    assert order.fits(body(rng), BOUNDARY)
-    assert not order.fits(csc_array(other), BOUNDARY)
-    assert not order.fits(A, BOUNDARY[:3])
 
 
 def test_what_is_too_large_goes_by_solves(

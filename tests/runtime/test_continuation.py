@@ -118,23 +118,6 @@ def test_the_last_two_steps_before_a_waypoint_are_equal() -> None:
     assert branch.parameters == pytest.approx((1.0, 1.3, 1.6, 1.8, 2.0))
 
 
-def test_every_point_is_reported_before_the_next_is_tried() -> None:
-    events: list[tuple[str, float]] = []
-
-    def problem_at(p: float) -> Algebraic:
-        events.append(("try", p))
-        return line(p)
-
-    branch = natural().follow(
-        problem_at,
-        1.0,
-        2.0,
-        np.ones(1),
-        on_point=lambda point: events.append(("met", point.parameter)),
-    )
-    assert events == [(what, p) for p in branch.parameters for what in ("try", "met")]
-
-
 def bend(p: float) -> Algebraic:
     """x^3 = q^3 with q = 1 + p + p^2, a path without curvature but in its own parabola."""
     q = 1.0 + p + p**2
@@ -152,21 +135,6 @@ def test_a_parabola_needs_no_iteration_on_a_path_that_is_one() -> None:
     assert min(iterations("secant", bend)[1:]) >= 2
     assert iterations("parabola", bend)[:3] == iterations("secant", bend)[:3]
     assert sum(iterations("parabola", line)[3:]) <= sum(iterations("secant", line)[3:])
-
-
-@pytest.mark.parametrize(("goal", "guess"), [(0.35, 1.0 + 0.35 + 0.35**2), (0.9, 1.24 + 0.7 * 1.3)])
-def test_a_parabola_is_not_prolonged_far(goal: float, guess: float) -> None:
-    # from 0, 0.1 and 0.2; at 0.9 the secant through 1.11 and 1.24 takes over
-    asked: dict[float, Algebraic] = {}
-
-    def path(p: float) -> Algebraic:
-        return asked.setdefault(p, bend(p))
-
-    walk = Continuation(Newton(), StepRule(0.7, 0.1), "parabola")
-    walk.follow(path, 0.0, goal, np.ones(1), waypoints=[0.1, 0.2])
-    assert asked[0.1].visited[0] == pytest.approx([1.0])
-    assert asked[0.2].visited[0] == pytest.approx([1.22])
-    assert asked[goal].visited[0] == pytest.approx([guess])
 
 
 def test_a_walk_resumes_with_the_secant_of_its_previous_point() -> None:
@@ -264,16 +232,6 @@ def test_a_step_that_rounding_swallows_ends_a_path() -> None:
     assert branch.parameters[-1] == pytest.approx(far + 1.0, abs=1e-3)
 
 
-@pytest.mark.parametrize("keep_all", [False, True])
-def test_only_the_last_two_points_keep_their_vectors(keep_all: bool) -> None:
-    branch = natural(keep_all=keep_all).follow(line, 1.0, 3.0, np.ones(1))
-    sizes = [point.solution.x.size for point in branch.points]
-    assert len(sizes) > 4
-    assert sizes == [1 if keep_all else 0] * (len(sizes) - 2) + [1, 1]
-    assert all(point.solution.residual_norms[-1] <= 1e-9 for point in branch.points)
-    assert branch.last is branch.points[-1].solution
-
-
 def test_the_predictor_stays_admissible() -> None:
     # log x = -p: the secant through p = 0 and 2 is negative at 4.
     tried: list[Algebraic] = []
@@ -367,26 +325,6 @@ def test_walk_ends_exactly_on_the_bound_it_crosses() -> None:
     assert len(branch.limit_points) == 1
 
 
-def test_a_bound_just_behind_a_fold_is_not_confused_with_it() -> None:
-    # Up to the fold at 1 and back to the bound below the start, although one step spans both.
-    walk = arc(steps=StepRule(0.4, 1e-4, 0.4), turn=160.0)
-    branch = walk.follow(circle, 0.99, np.array([math.sqrt(1 - 0.99**2)]), within=(0.985, 2.0))
-    assert branch.converged
-    assert len(branch.limit_points) == 1
-    assert branch.last.x == pytest.approx([-math.sqrt(1.0 - 0.985**2)], rel=1e-8)
-    assert branch.failures
-
-
-def test_a_sharp_turn_is_refused_and_the_step_cut() -> None:
-    branch = arc(steps=StepRule(0.9, 1e-3, 0.9), turn=30.0).follow(
-        circle, 0.0, np.ones(1), until=after_folds(1)
-    )
-    assert branch.failures[0].solution.status is Status.DIVERGED
-    assert "turned by" in branch.failures[0].solution.message
-    angles = [math.atan2(point.parameter, point.solution.x[0]) for point in branch.points]
-    assert max(np.diff(angles)) <= math.radians(30.0) + 1e-6
-
-
 def bratu(inner: int) -> Callable[[float], Algebraic]:
     """-u'' = lambda exp u on (0, 1) by second differences on `inner` points."""
     A = (2 * np.eye(inner) - np.eye(inner, k=1) - np.eye(inner, k=-1)) * (inner + 1.0) ** 2
@@ -471,40 +409,6 @@ def test_start_on_a_limit_point_is_singular() -> None:
     assert branch.status is Status.SINGULAR
     assert branch.points == ()
     assert "no tangent" in branch.message
-
-
-def test_path_that_ends_is_reported_with_the_parameter_reached() -> None:
-    def wall(p: float) -> Algebraic:
-        return Algebraic(
-            lambda x: np.where(x > 1.0, np.nan, x - p), lambda x: np.eye(1), lambda x, dx: 1.0
-        )
-
-    branch = arc(name="load factor").follow(wall, 0.0, np.zeros(1), within=(0.0, 2.0))
-    assert branch.status is Status.NOT_FINITE
-    reached = branch.parameters[-1]
-    assert 0.0 <= 1.0 - reached < 1e-3
-    assert f"reached load factor = {reached:.9g};" in branch.message
-    assert branch.failures[-1].solution.status is Status.NOT_FINITE
-
-
-@pytest.mark.parametrize(
-    ("within", "status"),
-    [((-math.inf, math.inf), Status.CONVERGED), ((-2.0, 2.0), Status.MAX_ITERATIONS)],
-)
-def test_max_points_is_a_failure_only_if_another_end_was_asked_for(
-    within: tuple[float, float], status: Status
-) -> None:
-    branch = arc(max_points=5).follow(circle, 0.0, np.ones(1), within=within)
-    assert (len(branch.points), branch.status) == (5, status)
-
-
-def test_arc_length_forgets_vectors_and_reports_points_too() -> None:
-    met: list[float] = []
-    branch = arc(keep_all=False, max_points=6).follow(
-        circle, 0.0, np.ones(1), on_point=lambda point: met.append(point.parameter)
-    )
-    assert [point.solution.x.size for point in branch.points] == [0, 0, 0, 0, 1, 1]
-    assert met == list(branch.parameters)
 
 
 def test_start_out_of_bounds_is_rejected() -> None:

@@ -257,18 +257,6 @@ def test_through_plasticity_and_load_steps(monkeypatch: pytest.MonkeyPatch) -> N
         assert found["metal", name] == pytest.approx(expected, rel=1e-6)
 
 
-def test_a_path_in_two_parts_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    study, by = strip(), {"metal": ["sy", "H"]}
-    whole = study.solve(steps=4, newton=EXACT, record=True)
-    half = study.solve(steps=2, until=0.5, newton=EXACT, record=True)
-    rest = study.solve(steps=2, newton=EXACT, record=True, start=half)
-    assert both_ways(rest, monkeypatch, what="u_x", by=by, reaction="right") == pytest.approx(
-        both_ways(whole, monkeypatch, what="u_x", by=by, reaction="right")
-    )
-    with pytest.raises(StudyError, match="were not recorded: give record=True"):
-        study.solve(steps=2, start=half).sensitivity("u_x", at=PLACE, by=by)
-
-
 @pytest.mark.parametrize("method", ["euler", "bdf2"])
 def test_through_time(method: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def last(k: float = 2.0, c: float = 0.7) -> Result:
@@ -358,14 +346,6 @@ def test_quantities_that_make_no_sense_are_refused() -> None:
         with pytest.raises(StudyError) as error:
             result.sensitivity(by=by, **asked)  # type: ignore[arg-type]
         assert words in str(error.value)
-
-
-def test_a_study_that_changed_has_no_derivatives() -> None:
-    study = panel()
-    result = study.solve()
-    study.load("right", u_x=1)
-    with pytest.raises(StudyError, match="changed after this result: solve it again"):
-        result.sensitivity("u_y", at=PLACE, by={"body": "mu"})
 
 
 def test_factors_solve_with_the_transpose() -> None:

@@ -13,20 +13,12 @@ import softehl
 from softehl import Definition, Model, quadrature
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.study import Study, StudyError
+from tests.runtime.field_pages import mixed
+from tests.runtime.field_pages import rubber_by_log as rubber
 
 LENGTH = 10.0
 MASS = {"body": {"rho": 1.0}}
 ALL = ("generalised-alpha", "newmark", "midpoint", "explicit")
-
-
-@softehl.page
-def rubber(m: Any) -> None:
-    """Compressible neo-Hooke."""
-    u = m.vector("u")
-    mu, lame = m.parameters(mu="shear modulus", lame="Lame's first")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + lame / 2 * sp.log(J) ** 2)
 
 
 @softehl.page
@@ -131,17 +123,6 @@ def test_the_midpoint_conserves_the_energy_of_a_swinging_beam() -> None:
     assert drift("generalised-alpha", 1) > 1e-4
 
 
-@softehl.page
-def mixed(m: Any) -> None:
-    """Hardly compressible, with a pressure of its own that has no mass."""
-    u, p = m.vector("u"), m.scalar("p", order=1)
-    mu, K = m.parameters(mu="shear modulus", K="bulk modulus")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    W = mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J))
-    m.minimise(W + p * (J - 1) - p**2 / (2 * K))
-
-
 def test_pressures_need_no_mass() -> None:
     study = Study(Mesh.rectangle(LENGTH, 1.0, cells=(6, 1), order=2))
     study.add("body", mixed, mu=50.0, K=1e6)
@@ -183,24 +164,6 @@ def test_loads_and_moving_supports_do_the_work(method: str) -> None:
     assert gained == pytest.approx(energy["external"], rel=5e-3)
     assert energy["balance"] == pytest.approx(gained - energy["external"], abs=1e-9)
     assert abs(energy["balance"]) < (1e-7 if method == "midpoint" else 5e-3) * energy["external"]
-
-
-@pytest.mark.parametrize("method", ALL)
-def test_tied_sides_move_as_one(method: str) -> None:
-    """Both sides have one motion, and ties do no work."""
-    study = Study(Mesh.rectangle(2.0, 1.0, cells=(8, 1)))
-    study.add("body", rubber, mu=50.0, lame=0.0)
-    study.tie("left", "right", "u_x", "u_y")
-    study.fix((0.0, 0.0), u_x=0, u_y=0)
-    push = {"u_x": lambda x: 0.01 * np.sin(np.pi * x[:, 0])}
-    states = steps(study, dt=0.01, until=0.3, method=method, mass=MASS, velocity=push)
-    u = states[-1].values("u_y")
-    mesh = study.mesh
-    left, right = (mesh.nodes(side) for side in ("left", "right"))
-    np.testing.assert_allclose(u[left], u[right], atol=1e-12)
-    energy = states[-1].energy
-    assert energy["internal"] > 1e-6
-    assert abs(energy["balance"]) < 0.02 * energy["kinetic"]
 
 
 def test_explicit_steps_are_stable_and_told() -> None:
@@ -255,3 +218,21 @@ def test_pages_with_accelerations_are_not_marched_without() -> None:
         steps(oscillator(), dt=1.0, until=2.0)
     with pytest.raises(StudyError, match="acceleration comes from the steps in time"):
         oscillator(acceleration=1.0)
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_tied_sides_move_as_one(method: str) -> None:
+    """Both sides have one motion, and ties do no work."""
+    study = Study(Mesh.rectangle(2.0, 1.0, cells=(8, 1)))
+    study.add("body", rubber, mu=50.0, lame=0.0)
+    study.tie("left", "right", "u_x", "u_y")
+    study.fix((0.0, 0.0), u_x=0, u_y=0)
+    push = {"u_x": lambda x: 0.01 * np.sin(np.pi * x[:, 0])}
+    states = steps(study, dt=0.01, until=0.3, method=method, mass=MASS, velocity=push)
+    u = states[-1].values("u_y")
+    mesh = study.mesh
+    left, right = (mesh.nodes(side) for side in ("left", "right"))
+    np.testing.assert_allclose(u[left], u[right], atol=1e-12)
+    energy = states[-1].energy
+    assert energy["internal"] > 1e-6
+    assert abs(energy["balance"]) < 0.02 * energy["kinetic"]

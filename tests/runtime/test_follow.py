@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from softehl import Definition, Model, Newton, quadrature
+from softehl import Definition, Model, quadrature
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.parallel.linear_solver_choice import nodal_modes
 from softehl.runtime.results.result import Result
-from softehl.runtime.solve.linear.amg import Multigrid
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.study import Study, StudyError
 
@@ -116,29 +114,6 @@ def test_a_path_along_which_a_spring_closes_a_gap() -> None:
     assert not limit.located
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("step", [0.3, 1.0, 10.0])
-def test_a_shallow_roof_snaps_through(step: float) -> None:
-    """A cylindrical strip, hinged at both ends; limits by steps of 0.1 without rules for angles."""
-    radius, angle, thickness = 2540.0, 0.1, 6.35
-
-    def bent(x: np.ndarray) -> np.ndarray:
-        turned, r = angle * (2 * x[:, 0] - 1), radius + thickness * (x[:, 1] - 0.5)
-        y = r * np.cos(turned) - radius * np.cos(angle)
-        return np.stack([r * np.sin(turned), y], axis=1)
-
-    study = Study(Mesh.rectangle(1, 1, cells=(40, 1), order=2).map(bent))
-    study.add("roof", material="saint_venant", E=3102.75, nu=0.3)
-    ends, top = bent(np.array([[0, 0.5], [1, 0.5]])), bent(np.array([[0.5, 1.0]]))
-    for end in ends:
-        study.fix(tuple(end), u_x=0, u_y=0)
-    study.load(tuple(top[0]), u_y=-1.0)
-    path = study.follow(step=step, until=lambda r: r.at(tuple(top[0]))["u_y"] < -35.0)
-    found = [limit.t for limit in path.limits]
-    np.testing.assert_allclose(found, [1.1838, -1.1244, -0.3860, -1.1471], atol=5e-5)
-    assert len(path.results) < 250
-
-
 def test_an_end_that_is_never_reached() -> None:
     with pytest.raises(NotConverged, match="5 points, the last at load factor") as error:
         shallow().follow(step=0.01, until=lambda r: False, most=5)
@@ -154,17 +129,6 @@ def test_what_is_refused() -> None:
     for linear in ("amg", "matrix-free"):
         with pytest.raises(StudyError, match=f'no linear = "{linear}", it factorises'):
             shallow().follow(step=0.1, until=lambda r: True, linear=linear)
-
-
-def test_multigrid_that_is_given_is_refused_by_name() -> None:
-    study = Study(Mesh.rectangle(2, 1, cells=(4, 2)))
-    study.add("body", material="neo_hooke", mu=1.0, kappa=3.0)
-    study.fix("left", u_x=0, u_y=0)
-    study.load("right", u_x=0.1)
-    modes = nodal_modes(study.system())
-    assert modes is not None
-    with pytest.raises(NotConverged, match="multigrid knows 30 unknowns, the matrix has 31"):
-        study.follow(step=1.0, until=lambda r: True, newton=Newton(linear=Multigrid(modes)))
 
 
 def test_history_is_committed_along_the_path() -> None:

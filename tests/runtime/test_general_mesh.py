@@ -104,32 +104,6 @@ def test_a_face_that_looks_inwards_is_seen() -> None:
     assert outflow(mesh) != pytest.approx(18.0, rel=1e-3)
 
 
-def test_map_and_names() -> None:
-    mesh = made("quad", 1).map(lambda x: x * [2.0, 1.0])
-    mesh = mesh.with_side("corner", lambda x: (x[:, 0] > 3.9) & (x[:, 1] < 0.1))
-    mesh = mesh.with_group("upper", lambda x: x[:, 1] > 1.0)
-    assert {kind: len(faces) for kind, faces in mesh.faces("corner").items()} == {"line2": 1}
-    assert len(mesh.cells_of("upper")["quad4"]) == 3
-    assert set(mesh.points[mesh.nodes("upper"), 1]) == {1.0, 2.0}
-    assert mesh.points[mesh.nodes(lambda x: x[:, 0] == 0.0), 0].max() == 0.0
-
-
-def test_other_formats_keep_points_and_cells(tmp_path: Path) -> None:
-    mesh = made("triangle", 2)
-    mesh.write(tmp_path / "part.vtu")
-    again = Mesh.read(tmp_path / "part.vtu")
-    np.testing.assert_array_equal(again.cells["tri6"], mesh.cells["tri6"])
-
-
-def test_unused_points_of_a_file_are_dropped(tmp_path: Path) -> None:
-    mesh = made("quad", 1)
-    more = Mesh(np.vstack([[[9.0, 9.0]], mesh.points]), {"quad4": mesh.cells["quad4"] + 1})
-    more.write(tmp_path / "part.msh")
-    again = Mesh.read(tmp_path / "part.msh")
-    assert len(again.points) == len(mesh.points)
-    assert outflow(again) == pytest.approx(12.0)
-
-
 def test_what_is_refused(tmp_path: Path) -> None:
     mesh = made("quad", 1)
     turned = Mesh(mesh.points, {"quad4": mesh.cells["quad4"][:, ::-1]})
@@ -181,13 +155,6 @@ def test_what_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bad.msh").write_text("nothing of a mesh\n")
     with pytest.raises(MeshError, match=r"bad\.msh"):
         Mesh.read(tmp_path / "bad.msh")
-
-
-def test_a_side_looks_outwards_however_its_faces_are_numbered() -> None:
-    mesh = made("quad", 2)
-    turned = {"line3": mesh.sides["right"]["line3"][:, [1, 0, 2]]}
-    again = Mesh(mesh.points, mesh.cells, sides={"right": turned})
-    np.testing.assert_array_equal(again.faces("right")["line3"], mesh.sides["right"]["line3"])
 
 
 def test_places_on_lines_in_a_plane_and_surfaces_in_space() -> None:

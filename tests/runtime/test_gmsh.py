@@ -59,29 +59,6 @@ def test_every_file_has_each_cell_once_with_all_its_names() -> None:
             np.testing.assert_allclose(mesh.points[faces][..., 0], x, atol=1e-9)
 
 
-def test_all_versions_of_a_mesh_are_the_same_mesh() -> None:
-    for file in FOLDER.glob("*_22.msh"):
-        mesh = Mesh.read(file)
-        for other in FOLDER.glob(f"{file.stem[:-3]}_[24]*.msh"):
-            again = Mesh.read(other)
-            np.testing.assert_allclose(again.points, mesh.points, atol=1e-14)
-            for kind, nodes in mesh.cells.items():
-                np.testing.assert_array_equal(np.sort(again.cells[kind], 0), np.sort(nodes, 0))
-
-
-def test_a_cell_of_two_names_is_written_and_read(tmp_path: Path) -> None:
-    mesh = Mesh.rectangle(2.0, 1.0, cells=(2, 1)).with_group("all", lambda x: x[:, 0] > 0.0)
-    mesh = mesh.with_group("low", lambda x: x[:, 0] < 1.0).with_side("left", lambda x: x[:, 0] == 0)
-    mesh = mesh.with_group("left", lambda x: x[:, 0] < 1.0).with_side("all", lambda x: x[:, 0] < 3)
-    mesh.write(tmp_path / "part.msh")
-    again = Mesh.read(tmp_path / "part.msh")
-    np.testing.assert_array_equal(again.cells["quad4"], mesh.cells["quad4"])
-    for name, group in mesh.groups.items():
-        np.testing.assert_array_equal(again.groups[name]["quad4"], group["quad4"])
-    assert len(again.sides["all"]["line2"]) == 6
-    assert len(again.sides["left"]["line2"]) == 1
-
-
 SQUARE = (FOLDER / "square_41.msh").read_text()
 DAMAGED = {
     "cells of Gmsh's type 7 are not known": re.sub(r"\n2 1 2 (\d)\n", r"\n2 1 7 \1\n", SQUARE),

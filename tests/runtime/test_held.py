@@ -94,14 +94,6 @@ def test_a_temperature_that_nothing_sets_is_named() -> None:
     assert study.solve().at((0.0,))["T"] == pytest.approx(1.0)
 
 
-def test_a_body_of_three_dimensions_on_a_hinge() -> None:
-    study = Study(Mesh.box((1.0, 2.0, 1.0), cells=(1, 2, 1)))
-    study.add("body", springy())
-    study.fix(lambda x: (x[:, 0] == 0.0) & (x[:, 2] == 1.0), u_x=0.0, u_y=0.0, u_z=0.0)
-    with pytest.raises(NotConverged, match=r"a rotation about y through \(0, 1, 1\)[.]"):
-        study.solve()
-
-
 def test_a_floor_holds_what_is_pressed_into_it() -> None:
     """It holds at the start already: its nodes are a little below."""
     study = Study(Mesh.rectangle(2.0, 1.0, cells=(4, 2)).map(lambda x: x - np.array([0.0, 1e-3])))
@@ -110,17 +102,6 @@ def test_a_floor_holds_what_is_pressed_into_it() -> None:
     study.fix((0.0, -1e-3), u_x=0.0)
     study.load("top", u_y=lambda x, t: np.full(len(x), -1e-2))
     assert 0.0 < study.solve().at((0.0, -1e-3))["u_y"] < 1e-3
-
-
-def springy() -> Definition:
-    """A linear elastic brick."""
-    m = Model("brick", nodes=8, rule=quadrature.gauss(2, 3))
-    X, u = m.coordinates("X", "Y", "Z"), m.nodal_unknowns("u_x", "u_y", "u_z")
-    e = kinematics.isoparametric(m, X, shapes.hex8_gradient(*m.point()))
-    F = kinematics.deformation_gradient(m, e.dN, u)
-    eps = (F + F.T) / 2 - sp.eye(3)
-    m.potential(m.integral("Pi", (eps.trace() ** 2 + (eps.T * eps).trace()) * e.detJ))
-    return m.finish()
 
 
 def chain(n: int, ground: float) -> csc_array[np.float64]:
@@ -144,25 +125,20 @@ def test_held_by_rounding_is_loose() -> None:
     assert unconstrained_unknown(K, SuperLU().factorise(K)) is not None
 
 
-def test_nodes_on_a_sloping_line_are_no_free_motion() -> None:
-    """Their coordinates are one up to a factor, so that their difference is no field."""
-    mesh = Mesh(
-        np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]), {"line2": np.array([[0, 1], [1, 2]])}
-    )
-    study = Study(mesh)
-    study.add("bar", lengthening())
-    study.spring((1.0, 1.0), u_x=1.0, u_y=1.0)
-    study.fix((0.0, 0.0), u_x=0.0, u_y=0.0)
-    study.fix((2.0, 2.0), u_x=0.0, u_y=0.0)
-    assert study.solve().norm() == 0.0
-
-
-def lengthening() -> Definition:
-    """A bar in the plane."""
-    m = Model("lengthening", nodes=2, rule=quadrature.point_rule(), unroll=True)
-    X, u = m.coordinates("X", "Y"), m.nodal_unknowns("u_x", "u_y")
-    apart = [x[1] - x[0] for x in X]
-    square = sum(a**2 for a in apart)
-    stretch = sum(a * (v[1] - v[0]) for a, v in zip(apart, u, strict=True)) / square
-    m.potential(stretch**2)
+def springy() -> Definition:
+    """A linear elastic brick."""
+    m = Model("brick", nodes=8, rule=quadrature.gauss(2, 3))
+    X, u = m.coordinates("X", "Y", "Z"), m.nodal_unknowns("u_x", "u_y", "u_z")
+    e = kinematics.isoparametric(m, X, shapes.hex8_gradient(*m.point()))
+    F = kinematics.deformation_gradient(m, e.dN, u)
+    eps = (F + F.T) / 2 - sp.eye(3)
+    m.potential(m.integral("Pi", (eps.trace() ** 2 + (eps.T * eps).trace()) * e.detJ))
     return m.finish()
+
+
+def test_a_body_of_three_dimensions_on_a_hinge() -> None:
+    study = Study(Mesh.box((1.0, 2.0, 1.0), cells=(1, 2, 1)))
+    study.add("body", springy())
+    study.fix(lambda x: (x[:, 0] == 0.0) & (x[:, 2] == 1.0), u_x=0.0, u_y=0.0, u_z=0.0)
+    with pytest.raises(NotConverged, match=r"a rotation about y through \(0, 1, 1\)[.]"):
+        study.solve()

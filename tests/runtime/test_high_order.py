@@ -111,18 +111,6 @@ def test_patch(kind: str) -> None:
     np.testing.assert_allclose(found, mesh.points @ slope, atol=1e-12)
 
 
-def test_polynomials_of_the_order_are_exact_and_higher_ones_are_not() -> None:
-    def error(power: int) -> float:
-        mesh = unit("quad25", 1)
-        x, y = mesh.points.T
-        exact = np.real((x + 1j * y) ** power)  # harmonic
-        found = solved(mesh, 0.0, lambda p, t: t * np.real((p[:, 0] + 1j * p[:, 1]) ** power))
-        return float(np.abs(found - exact).max())
-
-    assert error(4) < 1e-13
-    assert error(6) > 1e-4
-
-
 @pytest.mark.parametrize(
     ("kind", "sizes"),
     [
@@ -141,24 +129,6 @@ def test_order_of_convergence(kind: str, sizes: tuple[int, int]) -> None:
         error = study.solve().fields("body")["error"]
         errors.append(float(np.sqrt((error**2).mean())))
     assert np.log2(errors[0] / errors[1]) > CELLS[kind].order + 1 - 0.5
-
-
-def test_results_are_written_as_cells_between_the_nodes(tmp_path: Path) -> None:
-    meshio = pytest.importorskip("meshio")
-    mesh = unit("quad16", 2)
-    study = Study(mesh)
-    study.add("body", poisson, k=1.0)
-    study.fix("boundary", u=0.0)
-    study.solve().write(tmp_path / "u.vtu")
-    found = meshio.read(tmp_path / "u.vtu")
-    (cells,) = found.cells
-    assert cells.type == "quad"
-    assert len(cells.data) == 4 * 9
-    corners = found.points[cells.data][:, :, :2]
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
-    areas = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    assert areas.min() > 0.0
-    assert abs(areas.sum() - 1.0) < 1e-12
 
 
 def test_high_orders_have_no_file_format(tmp_path: Path) -> None:

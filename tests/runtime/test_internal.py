@@ -193,18 +193,6 @@ def test_a_step_that_is_cut_begins_anew_and_other_paths_keep_internal_unknowns()
     assert np.abs(path.results[-1].fields("body")["a_0"]).max() > 1e-3
 
 
-def test_sides_of_a_tie_pull_each_other_and_their_reactions_balance() -> None:
-    study = Study(Mesh.rectangle(2.0, 1.0, cells=(4, 2)))
-    study.add("body", MODELS / "mean_pressure.py", mu=SHEAR, K=BULK)
-    study.tie("right", "left", "u_x", offset=0.2)
-    study.fix((0.0, 0.0), u_x=0, u_y=0)
-    study.fix((2.0, 0.0), u_y=0)
-    result = study.solve()
-    left, right = (result.reaction(side)["u_x"] for side in ("left", "right"))
-    assert right > 0.1
-    assert left + right == pytest.approx(0.0, abs=1e-12 * right)
-
-
 def bent(page: str, points: Array | None = None, **changes: float) -> Study:
     """Skew cells, bent far."""
     given = {"mu": SHEAR, "second": LAME, "lift": 0.02} | changes

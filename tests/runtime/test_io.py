@@ -44,13 +44,6 @@ def test_number_text_reads_back_to_the_same_number(value: float) -> None:
     assert not text.endswith(".0")
 
 
-@pytest.mark.parametrize(
-    ("value", "text"), [(1600.0, "1600"), (-0.0, "0"), (0.5, "0.5"), (-25.0, "-25"), (3, "3")]
-)
-def test_number_text(value: float, text: str) -> None:
-    assert io.number_text(value) == text
-
-
 def test_columns_read_back(tmp_path: Path, rng: np.random.Generator) -> None:
     columns = {"x_mm": rng.standard_normal(7), "p_MPa": rng.standard_normal(7)}
     path = tmp_path / "profile.csv"
@@ -58,12 +51,6 @@ def test_columns_read_back(tmp_path: Path, rng: np.random.Generator) -> None:
     assert path.read_text().splitlines()[0] == "x_mm,p_MPa"
     again = io.read_columns(path, ["x_mm", "p_MPa"])
     assert all(np.array_equal(again[name], columns[name]) for name in columns)
-
-
-def test_columns_of_different_length(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="zip"):
-        io.write_columns(tmp_path / "p.csv", {"a": np.zeros(2), "b": np.zeros(3)})
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("text", ["", "a,c\n1,2\n", "a,b\n1\n"])
@@ -102,16 +89,6 @@ def test_vtu_reads_back(tmp_path: Path, rng: np.random.Generator) -> None:
     assert np.array_equal(mesh.point_data["displacement"], moved)
     assert np.array_equal(mesh.cell_data["sigma_zz"][0], stress)
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_section_reads_back_as_it_was_written(tmp_path: Path) -> None:
-    points = np.array([[0.0, 25.0], [1.0, 25.0], [1.0, 26.0], [0.0, 26.0]])
-    cells, stress = np.array([[0, 1, 2, 3]]), np.array([1.0, np.pi, -3.0, 0.0])
-    io.write_vtu(tmp_path / "s.vtu", points, cells, {"sigma": stress}, {})
-    again = io.read_vtu(tmp_path / "s.vtu")
-    np.testing.assert_array_equal(again[0], points)
-    np.testing.assert_array_equal(again[1], cells)
-    np.testing.assert_array_equal(again[2]["sigma"], stress)
 
 
 def test_a_damaged_section_is_named(tmp_path: Path) -> None:

@@ -100,22 +100,6 @@ def test_adaptive_steps_keep_the_tolerance() -> None:
     assert len(fewer) < len(results)
 
 
-def test_an_unknown_without_a_rate_does_not_choose_the_steps() -> None:
-    """A multiple of u that is zero at the start, where it is wrong: the steps are those of u."""
-    m = Model("follower", nodes=1, rule=quadrature.point_rule())
-    ((u,),) = m.nodal_unknowns("u")
-    ((w,),) = m.nodal_unknowns("w")
-    m.weak_form([(w - 5 * u, w)])
-    times = []
-    for with_follower in (False, True):
-        study = rod(10)
-        if with_follower:
-            study.add("follower", m.finish(), on=lambda x: x[:, 0] == 0.5)
-        march = study.march(dt=1e-4, until=0.1, method="bdf2", tolerance=1e-2)
-        times.append([result.t for result in march])
-    np.testing.assert_allclose(times[0], times[1], rtol=1e-9)
-
-
 def test_history_relaxes_as_the_closed_form_of_backward_euler() -> None:
     study = Study(Mesh.line(2.0, cells=3))
     study.add("bar", maxwell(), E=10.0, tau=0.5)
@@ -213,23 +197,6 @@ def test_a_checkpoint_that_was_edited_is_refused(tmp_path: Path) -> None:
     np.savez(file, **good)
     (step,) = rod(4).march(dt=0.1, until=0.2, restart=file)
     assert step.t == pytest.approx(0.2)
-
-
-def test_a_step_that_is_given_at_a_restart_is_used(tmp_path: Path) -> None:
-    file = tmp_path / "rod.npz"
-    list(rod(4).march(dt=0.1, until=0.2, checkpoint=file))
-    finer = rod(4).march(dt=0.05, until=0.4, restart=file)
-    np.testing.assert_allclose([r.t for r in finer], [0.25, 0.3, 0.35, 0.4])
-
-
-@pytest.mark.parametrize("until", [0.1, 0.2])
-def test_an_end_that_is_not_after_the_start(until: float, tmp_path: Path) -> None:
-    file = tmp_path / "rod.npz"
-    (*_, last) = rod(4).march(dt=0.1, until=0.2, checkpoint=file)
-    with pytest.raises(StudyError, match=rf"until = {until}: must be after .* t = 0\.2"):
-        rod(4).march(dt=0.1, until=until, restart=file)
-    with pytest.raises(StudyError, match=rf"until = {until}: must be after .* t = 0\.2"):
-        rod(4).march(dt=0.1, until=until, start=last)
 
 
 def test_a_step_that_was_cut_grows_again_to_what_was_asked_for() -> None:

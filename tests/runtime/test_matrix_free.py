@@ -17,7 +17,6 @@ from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.parallel.matrix_free import MatrixFree
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity import linearised_step
-from softehl.runtime.solve.linear import coarse_grid_solver, multigrid
 from softehl.runtime.solve.linear.direct import choose
 from softehl.runtime.solve.linear.krylov import conjugate_gradients, minimal_residuals
 from softehl.runtime.solve.linear.multigrid import Level, Multigrid
@@ -44,16 +43,6 @@ def carried(m: Fields) -> None:
     slopes = m.grad(T)
     m.weak(k * slopes, slopes)
     m.weak(slopes[0] - 1, T)
-    m.offer(product=True)
-
-
-@softehl.page
-def warming(m: Fields) -> None:
-    """Heat in time."""
-    T = m.scalar("T")
-    (k,) = m.parameters(k="conductivity")
-    m.weak(k * m.grad(T), m.grad(T))
-    m.weak(m.rate(T), T)
     m.offer(product=True)
 
 
@@ -143,16 +132,6 @@ def test_two_bodies_in_the_plane_and_several_threads() -> None:
     assert max(engine.iterations) < 30
 
 
-def test_iterations_do_not_grow_with_the_mesh() -> None:
-    counts = []
-    for n in (2, 4):
-        engine = MatrixFree()
-        block(2, 0.3, (n, n, n)).solve(engine=engine)
-        counts.append(max(engine.iterations))
-    assert counts[1] <= counts[0] + 2
-    assert counts[1] <= 10
-
-
 def test_a_tangent_that_is_not_symmetric() -> None:
     study = Study(Mesh.rectangle(1, 1, cells=(4, 4), order=4))
     study.add("body", carried, k=0.1)
@@ -180,14 +159,6 @@ def test_too_few_iterations_are_said() -> None:
         block(2, 0.3).solve(engine=MatrixFree(most=2))
     with pytest.raises(StudyError, match="allowed are 0 < tolerance < 1, most >= 1"):
         MatrixFree(tolerance=-1.0)
-
-
-def test_algebraic_multigrid_below(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("pyamg")
-    monkeypatch.setattr(coarse_grid_solver, "DIRECT_BELOW", 0)
-    engine, study = MatrixFree(), block(2, 0.3, (6, 6, 6))
-    assert apart(study.solve(), study.solve(engine=engine), ("u_x", "u_y", "u_z")) < 1e-8
-    assert max(engine.iterations) < 25
 
 
 # ---------------------------------------------------------------------------------- by themselves
@@ -221,13 +192,6 @@ def test_a_cycle_is_symmetric_and_positive(rng: np.random.Generator) -> None:
     assert np.abs(np.linalg.eigvals(np.eye(31) - M @ A.toarray())).max() < 0.2
 
 
-def test_the_largest_eigenvalue_is_estimated() -> None:
-    A = laplacian(31)
-    root = 1.0 / np.sqrt(A.diagonal())
-    exact = np.linalg.eigvalsh(root[:, None] * A.toarray() * root).max()
-    assert 0.9 * exact < multigrid.largest(A.__matmul__, A.diagonal()) <= exact * (1 + 1e-12)
-
-
 def test_krylov_methods(rng: np.random.Generator) -> None:
     A, b = laplacian(31), rng.uniform(-1, 1, 31)
     found = conjugate_gradients(A.__matmul__, cycle_of(A), b, 1e-12, 30)
@@ -249,17 +213,6 @@ def test_negative_curvature_ends_conjugate_gradients(rng: np.random.Generator) -
     found = conjugate_gradients(shifted.__matmul__, lambda r: r, b, 1e-12, 30)
     assert found.negative
     assert found.x @ b > 0.0
-
-
-def test_a_march_without_matrices() -> None:
-    study = Study(Mesh.rectangle(1, 1, cells=(3, 3), order=3))
-    study.add("plate", warming, k=1.0)
-    study.start(T=lambda x: np.sin(np.pi * x[:, 0]))
-    study.fix("left", T=0)
-    study.fix("right", T=0)
-    *_, wanted = study.march(dt=0.01, until=0.05)
-    *_, found = study.march(dt=0.01, until=0.05, engine=MatrixFree())
-    assert apart(wanted, found, ("T",)) < 1e-8
 
 
 def test_derivatives_need_no_factors(monkeypatch: pytest.MonkeyPatch) -> None:

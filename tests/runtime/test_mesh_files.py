@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from softehl import Mesh, Study
-from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError
 from tests.runtime.test_gmsh import misplaced, volume
 
@@ -111,13 +110,6 @@ def test_files_of_abaqus_and_calculix_have_all_their_sets(name: str) -> None:
             [mesh.points[v].reshape(-1, mesh.dimension) for v in faces.values()]
         )
         assert points.mean(axis=0) == pytest.approx(np.array(centre), abs=1e-12), side
-
-
-def test_both_sides_of_a_shell() -> None:
-    mesh = loaded("shells")
-    for side, sign in (("OUTER", 1.0), ("INNER", -1.0), ("PLAIN", 1.0)):
-        a, b, c = mesh.points[mesh.sides[side]["quad4"][0, :3]]
-        np.testing.assert_allclose(np.cross(b - a, c - a), [0.0, 0.0, sign])
 
 
 def test_rings_of_a_file_are_turned_as_the_warning_says() -> None:
@@ -370,12 +362,3 @@ def test_parametric_nodes_of_gmsh(title: str, tmp_path: Path) -> None:
         "$Elements\n1\n1 3 2 1 1 1 2 3 4\n$EndElements\n"
     )
     np.testing.assert_array_equal(Mesh.read(path).points, [[0, 0], [1, 0], [1, 1], [0, 1]])
-
-
-def test_kinds_and_mirrors() -> None:
-    """A cell seen in a mirror is the same cell the other way round."""
-    for cell in CELLS.values():
-        if cell.dimension:
-            order = list(cell.mirrored)
-            assert sorted(order) == list(range(len(order)))
-            assert np.array(order)[order].tolist() == list(range(len(order)))

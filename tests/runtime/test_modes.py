@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,37 +10,16 @@ import sympy as sp
 from scipy.linalg import eigh
 
 import softehl
-from softehl.runtime.discretisation.mass import lumped, mass_matrices
 from softehl.runtime.equations.mass_matrix import mass_matrix
 from softehl.runtime.equations.stability import UnstableState
-from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.results.result import Result
 from softehl.runtime.study import Study, StudyError
+from tests.runtime.field_pages import mixed
+from tests.runtime.field_pages import rubber_by_log as rubber
 
 LENGTH, HEIGHT, YOUNG, RHO = 100.0, 1.0, 2000.0, 1e-9
 EULER = np.pi**2 * YOUNG * HEIGHT**3 / 12 / (4 * LENGTH**2)
-
-
-@softehl.page
-def rubber(m: Any) -> None:
-    """Compressible neo-Hooke."""
-    u = m.vector("u")
-    mu, lame = m.parameters(mu="shear modulus", lame="Lame's first")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + lame / 2 * sp.log(J) ** 2)
-
-
-@softehl.page
-def mixed(m: Any) -> None:
-    """The same with a pressure of its own, of lower order."""
-    u, p = m.vector("u"), m.scalar("p", order=1)
-    mu, K = m.parameters(mu="shear modulus", K="bulk modulus")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    W = mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J))
-    m.minimise(W + p * (J - 1) - p**2 / (2 * K))
 
 
 @softehl.page
@@ -133,31 +110,6 @@ def test_modes_of_a_string_are_those_of_its_prestress() -> None:
         )
 
 
-def test_a_load_lowers_the_frequency_until_it_buckles() -> None:
-    """f^2 falls almost linearly with the load, to zero at Euler's."""
-    study = column()
-    free = at_rest(study).modes(1, mass=MASS).squares[0]
-    half = study.solve(until=0.5 * EULER).modes(1, mass=MASS).squares[0]
-    assert half / free == pytest.approx(0.5, abs=0.02)
-
-
-def test_a_free_body_has_modes_of_no_frequency() -> None:
-    study = Study(Mesh.rectangle(2.0, 1.0, cells=(4, 2)))
-    study.add("body", rubber, mu=1.0, lame=1.0)
-    study.tie("left", "right", "u_x", "u_y")
-    study.fix((0.0, 0.0), u_x=0, u_y=0)
-    held = study.solve()
-    free = Study(study.mesh)
-    free.add("body", rubber, mu=1.0, lame=1.0)
-    free.tie("left", "right", "u_x", "u_y")
-    # a state is needed about which it is free: that of the held one
-    loose = Result(free.system(), free.system().problem(still(free)), held.point)
-    squares = loose.modes(4, mass={"body": {"rho": 1.0}}).squares
-    np.testing.assert_allclose(squares[:2], 0.0, atol=1e-9)
-    assert squares[2] > 0.1
-    assert held.unstable == 0
-
-
 def free_body(mesh: Mesh, page: Any = rubber, **given: Any) -> Study:
     study = Study(mesh)
     study.add("body", page, **(given or {"mu": 0.5, "lame": 0.0}))
@@ -183,11 +135,6 @@ def test_a_body_that_nothing_holds() -> None:
     study.load("right", u_y=lambda x, t: 0.1)
     with pytest.raises(StudyError, match="loads or prescribed values are not zero at load factor"):
         study.modes(1, mass=mass)
-
-
-def still(study: Study) -> Any:
-    system = study.system()
-    return system.still(1.0, system.at_rest(), system.histories())
 
 
 def test_a_ring_at_rest_but_for_rounding() -> None:
@@ -225,25 +172,6 @@ def stretched(strain: float) -> Study:
 STRING = {"string": {"rho": 0.5, "of": ["u", "w"]}}
 
 
-def test_pressed_bodies_that_do_not_slip_are_one() -> None:
-    """Two rings in contact with equal motions along it, and one ring of both."""
-    found = []
-    for parted in (True, False):
-        mesh = Mesh.rectangle(2, 1, cells=(4, 3))
-        if parted:
-            left = Mesh.rectangle(1, 1, cells=(2, 3))
-            mesh = Mesh.union(left=left, right=left.map(lambda x: x + np.array([1.0, 0.0])))
-        study = Study(mesh, geometry="axisymmetric")
-        study.add("body", rubber, mu=1.0, lame=1.0)
-        study.fix("left:left" if parted else "left", u_x=0)
-        study.fix("right:right" if parted else "right", u_x=-0.2)
-        if parted:
-            study.contact("right:left", "left:right")
-            study.tie("right:left", "left:right", "u_y")
-        found.append(study.solve(steps=2).modes(3, mass={"body": {"rho": 1.0}}).squares)
-    np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
-
-
 def test_unknowns_without_mass_follow() -> None:
     modes = at_rest(column(mixed, mu=YOUNG / 2, K=2 * YOUNG)).modes(2, mass=MASS)
     plain = at_rest(column(rubber, mu=YOUNG / 2, lame=2 * YOUNG)).modes(2, mass=MASS)
@@ -278,29 +206,12 @@ def dense_mass(result: Result, rho: Any) -> np.ndarray:
     return M
 
 
-def test_masses_of_cells_add_up() -> None:
-    for kind in ("line3", "tri3", "tri6", "quad4", "quad8", "quad9", "tet10", "hex8", "hex20"):
-        cell = CELLS[kind]
-        places = cell.nodes[None] @ np.diag(np.arange(1.0, cell.dimension + 1))
-        found = mass_matrices(cell, places, np.array([3.0]), ring=False)
-        volume = cell.rule(1)[1].sum() * np.prod(np.arange(1.0, cell.dimension + 1))
-        assert found.sum() == pytest.approx(3.0 * volume, rel=1e-12)
-        assert (lumped(found) > 0.0).all()
-        assert lumped(found).sum() == pytest.approx(3.0 * volume, rel=1e-12)
-
-
 def test_masses_of_more_elements_than_are_evaluated_at_once() -> None:
     study = Study(Mesh.box((2.0, 1.0, 0.5), cells=(8, 8, 8)))
     study.add("body", material="neo_hooke", mu=1.0, kappa=1.0)
     system = study.system()
     M = mass_matrix(system, system.resting(), system.at_rest(), MASS)
     assert M.sum() == pytest.approx(3.0 * RHO, rel=1e-12)
-
-
-def test_mass_of_rings() -> None:
-    cell, places = CELLS["quad4"], np.array([[[0.0, 1.0], [2.0, 1.0], [2.0, 3.0], [0.0, 3.0]]])
-    found = mass_matrices(cell, places, np.ones(1), ring=True)
-    assert found.sum() == pytest.approx(np.pi * (9 - 1) * 2)
 
 
 def test_euler_loads() -> None:
@@ -311,24 +222,6 @@ def test_euler_loads() -> None:
     near = column().solve(until=0.9 * EULER)
     exact = column().buckling(1, start=near).factors
     np.testing.assert_allclose(exact, EULER, rtol=2e-4)
-
-
-def test_a_support_that_moves_buckles_too() -> None:
-    """At the strain of Euler's load, but for its second order."""
-    study = Study(Mesh.rectangle(LENGTH, HEIGHT, cells=(30, 1), order=2))
-    study.add("body", rubber, mu=YOUNG / 2, lame=0.0)
-    study.fix("left", u_x=0, u_y=0)
-    study.fix("right", u_x=-1, u_y=0)
-    strain = 4 * np.pi**2 * HEIGHT**2 / 12 / LENGTH**2  # both ends are clamped
-    assert study.buckling(1).factors[0] == pytest.approx(strain * LENGTH, rel=4e-3)
-
-
-def test_buckling_with_a_pressure_of_its_own() -> None:
-    given = {"mu": YOUNG / 2, "K": 2 * YOUNG}
-    found = column(mixed, **given).buckling(1).factors[0]
-    nu = 2 * YOUNG / (2 * (2 * YOUNG + YOUNG / 2))  # lame = 2 YOUNG, mu = YOUNG / 2
-    plane = 2 * (YOUNG / 2) * (1 + nu) / (1 - nu**2) / YOUNG
-    assert found == pytest.approx(plane * EULER, rel=5e-3)
 
 
 def test_a_ring_buckles_under_a_pressure_that_ends_at_supports() -> None:
@@ -352,30 +245,6 @@ def test_a_ring_buckles_under_a_pressure_that_ends_at_supports() -> None:
         assert study.solve(until=1.1).unstable == 1
 
 
-def test_a_tied_ring_under_pressure_is_that_of_one_piece() -> None:
-    """The pressures of both parts end at the tie; supports hold the other ends."""
-    factors = []
-    for parts in (1, 2):
-        angle = np.pi / 2 / parts
-
-        def bent(first: float, x: Any) -> Any:
-            r, a = 0.98 + x[:, 1], x[:, 0] + first
-            return np.column_stack([r * np.sin(a), r * np.cos(a)])
-
-        flat = Mesh.rectangle(angle, 0.04, cells=(8 // parts, 1), order=2)
-        arcs = {"ab"[k]: flat.map(partial(bent, angle * k)) for k in range(parts)}
-        study = Study(Mesh.union(**arcs))
-        study.add("ring", material="saint_venant", E=1000.0, nu=0.0)
-        for name in arcs:
-            study.pressure(f"{name}:top", 0.01)
-        if parts == 2:
-            study.tie("a:right", "b:left", "u_x", "u_y")
-        study.fix("a:left", u_x=0)
-        study.fix(f"{'ab'[parts - 1]}:right", u_y=0)
-        factors.append(study.buckling(1).factors[0])
-    assert factors[1] == pytest.approx(factors[0], rel=1e-8)
-
-
 def test_a_column_beyond_its_load_is_not_silent() -> None:
     study = column()
     below = study.solve(until=0.98 * EULER)
@@ -388,14 +257,6 @@ def test_a_column_beyond_its_load_is_not_silent() -> None:
     modes = beyond.modes(2, mass=MASS)
     assert modes.squares[0] < 0.0 < modes.squares[1]
     assert np.isnan(modes.frequencies[0])
-
-
-def test_a_body_of_negative_stiffness_is_unstable_along_all_its_unknowns() -> None:
-    study = Study(Mesh.rectangle(1.0, 1.0, cells=(2, 2)))
-    study.add("body", rubber, mu=-1.0, lame=-1.0)
-    study.fix("left", u_x=0, u_y=0)  # held nodes are no other field: nothing is a multiplier
-    with pytest.warns(UnstableState, match="12 independent directions"):
-        assert at_rest(study).unstable == 12
 
 
 def test_ties_and_pressures_are_not_taken_for_instabilities() -> None:
@@ -441,19 +302,6 @@ def test_a_cell_whose_displacements_are_prescribed_is_stable() -> None:
     assert result.unstable == 0
     with pytest.raises(StudyError, match="of the unknowns that have a mass 0 can move"):
         result.modes(1, mass=MASS)
-
-
-def test_condensed_and_mixed_columns_buckle() -> None:
-    page = Path(__file__).parents[2] / "docs" / "models" / "enhanced.py"
-    study = Study(Mesh.rectangle(LENGTH, HEIGHT, cells=(30, 1)))
-    study.add("body", page, mu=YOUNG / 2, lame=0.0)
-    study.fix("left", u_x=0, u_y=0)
-    study.load("right", u_x=-1.0 / HEIGHT)
-    assert study.solve(until=0.97 * EULER).unstable == 0
-    with pytest.warns(UnstableState, match="one direction"):
-        assert study.solve(until=1.03 * EULER).unstable == 1
-    with pytest.warns(UnstableState, match="one direction"):
-        assert column(mixed, mu=YOUNG / 2, K=YOUNG).solve(until=1.6 * EULER).unstable == 1
 
 
 @pytest.mark.parametrize(

@@ -74,16 +74,6 @@ def test_mass_of_bent_cells_of_every_kind_is_exact(ring: bool) -> None:
         assert np.abs(found - want).max() < 1e-12 * np.abs(want).max(), kind
 
 
-def test_mass_of_a_field_at_the_corners_of_bent_cells_has_their_volume() -> None:
-    for kind, flat in (("quad9", "quad4"), ("quad36", "quad4"), ("tet10", "tet4")):
-        cell = CELLS[kind]
-        places = curved(cell, cell.dimension)
-        at, weights = fine(cell)
-        volume = (measure(cell, places, at) * weights).sum(axis=1)
-        found = mass_matrices(CELLS[flat], places, np.ones(2), ring=False, geometry=cell)
-        np.testing.assert_allclose(found.sum(axis=(1, 2)), volume, rtol=1e-12)
-
-
 def test_lumped_masses_of_lobatto_nodes_are_the_weights_of_their_rule() -> None:
     """2 / (p (p + 1) P_p(x)^2): explicit motions are then those of spectral elements."""
     for kind in ("line2", "line5", "quad9", "quad16", "quad49", "hex64"):
@@ -147,20 +137,6 @@ def test_pressures_of_the_order_of_the_face_have_exact_nodal_forces(ring: bool) 
         given = {"parameters": np.array([0.7, 1.0])}
         found = kernel.residual(X.reshape(1, -1), u.reshape(1, -1), **given)[0]
         assert np.abs(found - want).max() < 1e-12 * np.abs(want).max(), kind
-
-
-@pytest.mark.parametrize(("kind", "ring"), [("line7", True), ("quad16", False)])
-def test_the_tangent_of_a_pressure_on_high_orders(kind: str, ring: bool) -> None:
-    face = CELLS[kind]
-    X = curved(face, face.dimension + 1)[:1].reshape(1, -1)
-    u = 0.01 * np.random.default_rng(5).uniform(-1, 1, X.shape)
-    kernel, given = Pressure(face, 0.7, ring), {"parameters": np.array([1.0, 1.0])}
-    K = kernel.tangent(X, u, **given)[1]
-    for j in range(0, X.shape[1], 5):
-        step = np.zeros_like(u)
-        step[:, j] = h = 1e-6
-        rise = kernel.residual(X, u + step, **given) - kernel.residual(X, u - step, **given)
-        np.testing.assert_allclose(K[:, :, j], rise / (2 * h), atol=1e-7)
 
 
 @page

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import sympy as sp
 from scipy.optimize import fsolve
 
 import softehl
@@ -15,20 +14,11 @@ from softehl.runtime.analyses.homogenisation import Cell
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.argument_checks import node_partners, partners
 from softehl.runtime.definition.problem_definition import StudyError
+from tests.runtime.field_pages import rubber
 
 SOFT, STIFF = (0.4, 1.3), (2.0, 5.0)
 SHARE = 0.25
 F = np.array([[1.15, 0.2], [-0.05, 0.9]])
-
-
-@softehl.page
-def rubber(m: Any) -> None:
-    """Compressible neo-Hooke."""
-    u = m.vector("u")
-    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + K / 2 * (J - 1) ** 2)
 
 
 def laminate(cells: tuple[int, int] = (4, 2), turn: bool = False) -> Cell:
@@ -90,28 +80,6 @@ def test_components_of_the_stress_may_vanish_instead() -> None:
     assert abs(found.P[1, 1]) < 1e-10
     assert 0.5 < found.F[1, 1] < 1.0
     assert np.abs(found.P - layers(found.F)).max() < 1e-9
-
-
-def test_a_path_goes_on_from_a_state() -> None:
-    cell = laminate()
-    half = cell.solve(0.5 * (np.eye(2) + F))
-    assert np.abs(cell.solve(F, start=half).P - cell.solve(F).P).max() < 1e-9
-
-
-def test_rounding_at_rest_is_no_force() -> None:
-    """The derivative of J^(-2/3) I1 leaves rounding in the forces of an undeformed cell."""
-    study = softehl.Study(softehl.Mesh.rectangle(1, 1, cells=(7, 5)))
-    study.add("body", material="neo_hooke", mu=0.4, kappa=0.9)
-    cell = study.periodic(("left", "right"), ("bottom", "top"))
-    rest = cell.solve(np.eye(2))
-    r, forces = rest.result.problem.assembler.residual_and_size(
-        rest.result.x, rest.result.problem.parameters
-    )
-    assert np.abs(r).max() > 1e-3 * forces.max() > 0.0  # nothing else is there
-    lame, J = 0.9 / 2 * (1.1 - 1 / 1.1), 1.1  # of F = diag(1.1, 1): closed form
-    I1 = J**2 + 2
-    dev = 0.4 * J ** (-2 / 3) * (J - I1 / (3 * J))
-    assert cell.solve([[1.1, 0], [0, 1]]).P[0, 0] == pytest.approx(dev + lame, rel=1e-10)
 
 
 def test_a_hole_counts_in_the_volume_and_corners_are_one_node() -> None:

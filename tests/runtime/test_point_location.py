@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from time import process_time
-
 import numpy as np
 import pytest
 
@@ -90,25 +88,6 @@ def test_the_nearest_cell_is_that_of_a_search_of_all(rng: np.random.Generator) -
     away = np.linalg.norm(positions(mesh, found) - places, axis=1)
     assert (away >= distance - 1e-12).all()
     assert np.median(away - distance) < 0.02  # the foot of a bilinear cell is not quite the nearest
-
-
-def test_cells_of_very_different_sizes() -> None:
-    """From 1 to 1e-6, ten times longer than high: a point has few candidates."""
-    x = np.concatenate([[0.0], np.cumsum(np.geomspace(1e-6, 1.0, 60))])
-    mesh = Mesh.rectangle(60, 10, cells=(60, 10)).map(
-        lambda p: np.stack([np.interp(p[:, 0], np.arange(61), x), p[:, 1]], axis=1)
-    )
-    middles = mesh.points[mesh.cells["quad4"]].mean(axis=1)
-    np.testing.assert_array_equal(mesh.holding(middles).row, np.arange(len(middles)))
-
-
-def test_many_points_in_many_cells_take_little_time() -> None:
-    mesh = Mesh.rectangle(1.0, 1.0, cells=(200, 200))
-    places = np.linspace([0.01, 0.02], [0.93, 0.97], 1000)
-    start = process_time()
-    found = mesh.holding(places)
-    assert process_time() - start < 0.25  # of each place alone the boxes of all cells: 14 s
-    np.testing.assert_allclose(positions(mesh, found), places[found.point], atol=1e-14)
 
 
 def touching_bars() -> Study:

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from softehl import Mesh, Study
 from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.weak_form import Page
-from softehl.runtime.discretisation.loads import DeadLoad, Pressure
+from softehl.runtime.discretisation.loads import Pressure
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.study import StudyError
@@ -94,28 +94,6 @@ def test_the_tangent_is_the_derivative_of_the_residual(kind: str, rng: np.random
     wrong = K.copy()
     wrong[0, 0, -1] += 1e-6
     assert not np.allclose(wrong, K, rtol=0.0, atol=1e-9)
-
-
-def test_undeformed_it_is_a_dead_load() -> None:
-    face = CELLS["line2"]
-    X = np.array([[0.0, 0.0, 0.0, 3.0]])  # upwards: the body is on the left, its outside at x > 0
-    given = {"parameters": np.array([1.0, 1.0])}
-    r = Pressure(face, 0.7).residual(X, np.zeros((1, 4)), **given)
-    dead = DeadLoad(face, -0.7).residual(X, np.zeros((1, 2)), **given)
-    np.testing.assert_allclose(r, [[dead[0, 0], 0.0, dead[0, 1], 0.0]], atol=1e-15)
-
-
-def test_a_side_that_is_numbered_clockwise_is_pressed_inwards() -> None:
-    study = body("quad4")
-    mesh = study.mesh
-    sides = {**mesh.sides, "right": {"line2": mesh.sides["right"]["line2"][:, ::-1]}}
-    turned = Study(Mesh(mesh.points, mesh.cells, sides=sides))
-    turned.add("body", rubber, mu=MU, lame=LAME)
-    for each in (study, turned):
-        each.fix("left", u_x=0.0, u_y=0.0)
-        each.pressure("right", 0.1)
-    np.testing.assert_allclose(turned.solve().x, study.solve().x)
-    assert study.solve().at((2.0, 0.5))["u_x"] < 0.0
 
 
 def test_a_face_of_two_cells_or_of_none_has_no_outside() -> None:

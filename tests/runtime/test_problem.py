@@ -19,8 +19,6 @@ from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.solve.arclength import Arclength
-from softehl.runtime.solve.continuation import StepRule
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Status
 from tests.runtime.springs import Spring
@@ -171,20 +169,6 @@ def test_coordinates_that_are_not_finite_are_named() -> None:
         Assembler.build(50, [replace(solid, coordinates=coordinates)])
 
 
-def test_a_block_without_elements_or_coordinates_is_none_the_worse() -> None:
-    p = problem()
-    mesh, (solid, pull) = ring()
-    none = replace(solid, name="none", coordinates=np.empty((0, 8)), dofs=solid.dofs[:0])
-    bare = replace(pull, coordinates=np.empty(0))
-    more = replace(
-        p,
-        assembler=Assembler.build(2 * len(mesh.points), [solid, bare, none]),
-        parameters={**p.parameters, "none": SOLID},
-    )
-    assert solved(more) == pytest.approx(solved(p), rel=1e-12)
-    assert "element" in more.where_not_finite(np.full(50, np.nan))
-
-
 def test_sizes_that_do_not_fit_are_named() -> None:
     solid = ring()[1][0]
     with pytest.raises(ProblemError, match="coordinates of 15 elements and dofs of 16"):
@@ -254,71 +238,7 @@ def test_a_residual_that_is_not_finite_names_block_element_and_place() -> None:
         solution.raise_for_status()
 
 
-class Log(Force):
-    """log(1 - u) = force: steps from 0 with a force above 1 leave the domain."""
-
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
-        return np.asarray(np.log(1.0 - dofs) + given["parameters"][0])
-
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
-        return self.residual(coordinates, dofs, **given), (-1.0 / (1.0 - dofs))[:, :, None]
-
-
-def test_a_step_that_leaves_the_domain_names_the_element() -> None:
-    block = ElementBlock("logs", Log(), np.zeros((2, 0)), np.array([[0], [1]]))
-    p = Problem(Assembler.build(2, [block]), DofLayout.of(u=2), {"logs": [1e6]})
-    solution = Newton().solve(p, np.zeros(2))
-    assert solution.status is Status.NOT_FINITE
-    assert "element 0 of block 'logs' and 1 more" in solution.message
-
-
-class NoTangent(Force):
-    """A residual whose tangent is not a number."""
-
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
-        n, k = dofs.shape
-        return self.residual(coordinates, dofs, **given), np.full((n, k, k), np.nan)
-
-
-def test_a_tangent_that_is_not_finite_names_the_element() -> None:
-    block = ElementBlock("bad", NoTangent(), np.zeros((2, 0)), np.array([[0], [1]]))
-    p = Problem(Assembler.build(2, [block]), DofLayout.of(u=2), {"bad": [1.0]})
-    solution = Newton().solve(p, np.zeros(2))
-    assert solution.status is Status.SINGULAR
-    assert "not finite: element 0 of block 'bad'" in solution.message
-
-
 # --- paths ---------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Arch(Spring):
-    """u^3 - 3 u^2 + 2.5 u, which is largest at u = 1 - 1 / sqrt(6)."""
-
-    parameters: tuple[str, ...] = ()
-
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
-        return dofs**3 - 3.0 * dofs**2 + 2.5 * dofs
-
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
-        return self.residual(coordinates, dofs), (3.0 * dofs**2 - 6.0 * dofs + 2.5)[:, :, None]
-
-
-def test_a_path_of_problems_is_followed_by_arc_length_without_scales() -> None:
-    place = np.zeros((1, 1), dtype=np.int64)
-    kernels = {"a": Arch(), "f": Force()}
-    blocks = [ElementBlock(n, kernel, np.zeros((1, 0)), place) for n, kernel in kernels.items()]
-    p = Problem(Assembler.build(1, blocks), DofLayout.of(u=1), {"a": [], "f": [0.0]})
-    arc = Arclength(Newton(), StepRule(0.05, 1e-4, 0.1))
-    branch = arc.follow(
-        lambda force: p.with_parameters(f={"force": force}),
-        0.0,
-        np.zeros(1),
-        until=lambda branch: len(branch.limit_points) == 2,
-    ).raise_for_status()
-    for fold, u in zip(branch.limit_points, (1 - 6**-0.5, 1 + 6**-0.5), strict=True):
-        assert fold.x[0] == pytest.approx(u, abs=1e-6)
-        assert fold.parameter == pytest.approx(u**3 - 3 * u**2 + 2.5 * u, abs=1e-9)
 
 
 # --- the criterion -------------------------------------------------------------------------------
@@ -344,73 +264,9 @@ def test_small_loads_are_solved_as_well_as_large_ones(
         assert np.abs(linear).max() > 10.0 * off
 
 
-def test_units_do_not_matter() -> None:
-    """In N and mm, or in MN and m: the same iterations, the same norms, the same answer."""
-    blocks = ring()[1]
-    p = problem(4.0)
-    scaled = [replace(block, coordinates=1e-3 * np.asarray(block.coordinates)) for block in blocks]
-    q = replace(
-        p,
-        assembler=Assembler.build(50, scaled),
-        parameters={
-            "solid": SOLID,
-            "pull": {"force": 4e-6},
-        },
-    )
-    a, b = (Newton().solve(one, np.zeros(50)).raise_for_status() for one in (p, q))
-    assert a.iterations == b.iterations
-    assert 1e3 * b.x == pytest.approx(a.x, rel=1e-8, abs=1e-10)
-    assert a.residual_norms[:-1] == pytest.approx(b.residual_norms[:-1], rel=1e-4)
-
-
-def test_a_body_at_rest_that_was_moved_converges_although_only_rounding_is_left() -> None:
-    """Every equation holds to rounding only, and nothing else is there to compare it with."""
-    p = problem(0.0)
-    moved = np.tile([0.125, 0.0], 25)  # along the axis, without a stress
-    moving = replace(p, values=moved[p.fixed])
-    for start in (np.zeros(50), moved):
-        solution = Newton().solve(moving, start).raise_for_status()
-        assert solution.x == pytest.approx(moved, abs=1e-12)
-        assert solution.iterations <= 4
-
-
 def test_a_body_that_a_step_threw_away_is_not_solved() -> None:
     """So far away that the rounding of its places is larger than its load."""
     p = problem(1e-3, fixed=np.empty(0, dtype=np.int64), values=np.empty(0))
     _, K = p.linearise(np.zeros(50))
     away = np.tile([1e17, 0.0], 25)
     assert p.measure(away, K) == p.measure(away, K, rounded=True) == 1.0
-
-
-def test_prescribed_values_count_relative_to_themselves() -> None:
-    p = problem(0.0)
-    tiny = replace(p, values=np.full(len(p.fixed), 1e-13))
-    solution = Newton().solve(tiny, np.zeros(50)).raise_for_status()
-    assert solution.x[p.fixed] == pytest.approx(1e-13, rel=1e-9)
-
-
-def test_a_field_without_a_scale_is_monitored() -> None:
-    """An equation alone in its field, beside one that is solved from the start."""
-    blocks = [
-        ElementBlock(name, Spring(), np.zeros((1, 0)), np.array([[3 * k, 3 * k + 1, 3 * k + 2]]))
-        for k, name in enumerate("ab")
-    ]
-    p = Problem(
-        Assembler.build(6, blocks),
-        DofLayout.of(u=3, v=3),
-        dict.fromkeys("ab", np.array([1.0, 0.0])),
-        scales={"u": 1.0},
-        fixed=np.array([3]),
-        values=np.array([0.7]),
-    )
-    x = solved(p)
-    assert x[:3] == pytest.approx(0.0, abs=1e-12)
-    assert p.assembler.residual(x, p.parameters)[[4, 5]] == pytest.approx(0.0, abs=1e-8)
-    assert np.abs(x[4:]).min() > 0.01
-
-
-def test_absolute_scales_measure_as_they_say() -> None:
-    p = problem(4e-10, scales={"displacement": 1.0}, absolute=True)
-    solution = Newton().solve(p, np.zeros(50)).raise_for_status()
-    assert solution.iterations == 0
-    assert solution.residual_norms[0] == pytest.approx(p.norm(p.residual(np.zeros(50))))

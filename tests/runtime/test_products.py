@@ -12,7 +12,6 @@ from softehl import Mesh
 from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.weak_form import Page
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.discretisation import matrix_free_products
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.matrix_free_products import NoProductError, Places, Product
@@ -111,10 +110,3 @@ def test_what_has_no_product_is_refused(rng: np.random.Generator) -> None:
         block = assembled(page, kind, rng)[0].block("b")
         with pytest.raises(NoProductError, match=r"says m\.offer\(product=True\)"):
             Places.of(block, 1)
-
-
-def test_threads_are_those_of_openmp(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", "3")
-    assert matrix_free_products.threads() == 3
-    monkeypatch.setenv("OMP_NUM_THREADS", "")
-    assert matrix_free_products.threads() >= 1

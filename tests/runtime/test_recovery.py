@@ -8,9 +8,8 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-import sympy as sp
 
-from softehl import Mesh, Model, Study, element, page, quadrature
+from softehl import Mesh, Study, element, page
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.kernel import Rule
 from softehl.runtime.mesh.cells import CELLS
@@ -241,38 +240,3 @@ def test_facets_have_values_at_the_nodes_of_both_cells() -> None:
     np.testing.assert_allclose(nodal["y"][there], y[there], atol=1e-12)
     assert np.isnan(nodal["x"][~there]).all()
     assert middle.sum() == 4
-
-
-def test_elements_by_their_nodes_have_means(tmp_path: Path) -> None:
-    m = Model("rope", nodes=2, rule=quadrature.point_rule())
-    (u,) = m.nodal_unknowns("u")
-    m.potential((u[1] - u[0]) ** 2 / 2)
-    m.fields(force=u[1] - u[0])
-    mesh = Mesh.rectangle(1.0, 1.0, cells=(1, 1), order=2)
-    study = Study(mesh)
-    study.add("body", conduction, k=1.0)
-    ends = [mesh.node_at(np.array([c, c])) for c in (0.0, 1.0)]
-    study.add("rope", m.finish(), on=[ends], called={"u": "T"})
-    study.fix("left", T=0)
-    study.fix("right", T=1)
-    result = study.solve()
-    np.testing.assert_allclose(result.at_nodes("rope")["force"][ends], 1.0)
-    result.write(tmp_path / "a.vtu")
-    names = set(meshio.read(tmp_path / "a.vtu").point_data)
-    assert {"body.slope", "T"} <= names
-    assert "rope.force" not in names
-
-
-def test_a_quadrature_of_another_cell_is_not_extrapolated() -> None:
-    """Its points are places of something else: the nodes have the mean."""
-    m = Model("odd", nodes=2, rule=quadrature.gauss(2, 1), unroll=False)
-    (u,) = m.nodal_unknowns("u")
-    (xi,) = m.point()
-    m.potential(m.integral("Pi", (u[1] - u[0]) ** 2 / 2 + 0 * xi))
-    m.fields(xi=sp.sympify(xi))
-    study = Study(Mesh.line(1.0, cells=1))
-    unit = Rule(np.array([[0.2], [0.8]]), np.array([0.5, 0.5]))
-    study.add("a", m.finish(), called={"u": "T"}, rule=unit)
-    study.fix("left", T=0)
-    study.fix("right", T=1)
-    np.testing.assert_allclose(study.solve().at_nodes("a")["xi"], [0.5, 0.5])

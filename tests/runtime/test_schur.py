@@ -163,40 +163,6 @@ def test_the_chosen_solution_is_found(linear: Condenser) -> None:
     assert solution.factorisations == 0
 
 
-def test_a_linear_body_needs_one_outer_iteration() -> None:
-    problem = Chain(softening=0.0)
-    solution = ModifiedNewton(inner_gain=0.0).solve(
-        problem, condensed(SuperLU(), problem, np.zeros(N)), np.zeros(N)
-    )
-    assert solution.iterations == 1
-    assert solution.x == pytest.approx(answer(1.0), abs=1e-9)
-
-
-def test_mixing_saves_iterations_and_age_costs_them() -> None:
-    problem = Chain()
-    far, near = (condensed(SuperLU(), problem, x) for x in (np.zeros(N), 0.9 * answer(1.0)))
-    counts = {
-        (depth, name): ModifiedNewton(depth=depth, max_outer=200, contraction=0.99)
-        .solve(problem, c, np.zeros(N))
-        .iterations
-        for depth in (0, 4)
-        for name, c in (("far", far), ("near", near))
-    }
-    assert counts[4, "far"] < 0.8 * counts[0, "far"]
-    assert counts[4, "near"] < counts[4, "far"]
-
-
-def test_a_wrong_schur_complement_costs_iterations_only() -> None:
-    problem = Chain()
-    right = condensed(SuperLU(), problem, answer(1.0))
-    wrong = replace(right, schur=1.2 * right.schur)
-    a, b = (ModifiedNewton().solve(problem, c, np.zeros(N)) for c in (right, wrong))
-    assert a.converged
-    assert b.converged
-    assert b.iterations > a.iterations
-    assert b.x == pytest.approx(a.x, abs=1e-9)
-
-
 def test_a_layer_that_contradicts_the_residual_never_converges() -> None:
     class Forged(Chain):
         def layer_residual(self, x: Array) -> Array:
@@ -251,63 +217,6 @@ def test_one_condensation_serves_a_path() -> None:
     assert branch.factorisations == 1
     assert points[-1] == 1.0
     assert branch.last.x == pytest.approx(answer(1.0), abs=1e-9)
-
-
-def test_an_outdated_condensation_is_renewed_where_the_last_solution_was() -> None:
-    corrector = SchurCorrector(SuperLU(), stale=0.0)
-    first = corrector.solve(Chain(0.5), np.zeros(N))
-    second = corrector.solve(Chain(0.6), first.x)
-    assert (first.factorisations, second.factorisations) == (1, 1)
-    assert corrector.tangent.state is first.x
-
-
-def test_a_slow_solve_is_tried_again_with_a_new_condensation() -> None:
-    corrector = SchurCorrector(SuperLU(), ModifiedNewton(max_outer=6, depth=0), stale=1.0)
-    near = corrector.solve(Chain(0.9), 0.9 * answer(1.0))
-    assert near.converged
-    corrector.tangent.condensed = condensed(SuperLU(), Chain(), np.full(N, 3.0))  # a useless one
-    corrector.tangent.state = np.full(N, 3.0)
-    again = corrector.solve(Chain(0.92), near.x)
-    assert again.converged
-    assert again.factorisations == 1
-    assert again.iterations > 6
-
-
-def test_a_failure_with_a_new_condensation_is_handed_on() -> None:
-    corrector = SchurCorrector(SuperLU(), ModifiedNewton(max_outer=1))
-    solution = corrector.solve(Chain(), np.zeros(N))
-    assert solution.status is Status.MAX_ITERATIONS
-    assert solution.factorisations == 1
-
-
-def useless() -> StaleTangent:
-    """A condensation made far from the solution, with which a solve takes long."""
-    place = np.full(N, 3.0)
-    return StaleTangent(condensed(SuperLU(), Chain(), place), place, 0.9 * answer(1.0))
-
-
-def test_a_slow_solve_that_is_near_goes_on_with_a_condensation_made_where_it_is() -> None:
-    iteration, x0 = ModifiedNewton(max_outer=6, depth=0), 0.9 * answer(1.0)
-    solved = {}
-    for near in (0.0, 1e3):
-        corrector = SchurCorrector(SuperLU(), iteration, stale=1.0, near=near, tangent=useless())
-        solved[near] = corrector.solve(Chain(0.92), x0)
-        assert solved[near].x == pytest.approx(answer(0.92), abs=1e-8)
-        assert corrector.tangent.accepted is solved[near].x
-    assert solved[1e3].residual_norms[0] < solved[0.0].residual_norms[0]  # it did not begin again
-    assert solved[1e3].iterations < solved[0.0].iterations
-    assert solved[1e3].factorisations == 1
-
-
-def test_a_condensation_made_on_the_way_to_nowhere_is_not_used_again() -> None:
-    corrector = SchurCorrector(SuperLU(), ModifiedNewton(max_outer=1), near=1e3, tangent=useless())
-    failed = corrector.solve(Chain(), np.zeros(N))
-    assert failed.status is Status.MAX_ITERATIONS
-    assert (failed.factorisations, failed.iterations) == (2, 3)
-    assert corrector.tangent.outdated
-    again = corrector.solve(Chain(0.1), np.zeros(N))
-    assert corrector.tangent.state is not failed.x
-    assert again.factorisations >= 1
 
 
 def test_a_residual_held_up_by_rounding_is_finished_by_newton() -> None:
@@ -394,15 +303,6 @@ def test_newton_goes_on_where_a_wall_of_the_body_stalls_the_iteration(
         assert solution.factorisations > 3  # with those of what stalled
 
 
-def test_rounding_does_not_outdate_a_condensation() -> None:
-    corrector = SchurCorrector(SuperLU(), ModifiedNewton(), finish=Newton(max_iterations=1))
-    first = corrector.solve(Rough(), np.zeros(N))
-    assert first.converged
-    again = corrector.solve(Rough(), first.x)
-    assert again.converged
-    assert not corrector.tangent.outdated
-
-
 def test_a_singular_body_is_a_status() -> None:
     class Loose(Chain):
         def body(self, x: Array) -> csc_array[np.float64]:
@@ -411,15 +311,6 @@ def test_a_singular_body_is_a_status() -> None:
             return csc_array(A)
 
     assert SchurCorrector(SuperLU()).solve(Loose(), np.zeros(N)).status is Status.SINGULAR
-
-
-def test_a_looser_view_shares_the_condensation() -> None:
-    corrector = SchurCorrector(SuperLU())
-    loose = corrector.with_tolerance(1e-2).solve(Chain(0.5), np.zeros(N))
-    tight = corrector.solve(Chain(0.5), loose.x)
-    assert loose.residual_norms[-1] > 1e-6
-    assert (loose.factorisations, tight.factorisations) == (1, 0)
-    assert tight.x == pytest.approx(answer(0.5), abs=1e-9)
 
 
 def test_a_tangent_is_cut_from_a_larger_one() -> None:

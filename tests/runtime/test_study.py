@@ -101,20 +101,6 @@ def test_a_parameter_that_follows_the_load_factor_and_a_follower_load() -> None:
     assert cauchy == pytest.approx(-0.5, rel=1e-9)
 
 
-def test_unknowns_of_cells_and_shared_ones() -> None:
-    study = Study(Mesh.rectangle(1.0, 1.0, cells=(2, 2)))
-    study.add("body", pages.mean_pressure(), mu=MU, kappa=100.0)
-    study.fix("bottom", u_x=0.0, u_y=0.0)
-    study.fix("top", u_x=0.1, u_y=0.0)
-    result = study.solve()
-    assert result.values("p").shape == (4,)
-    shared = Study(study.mesh)
-    shared.add("body", pages.mean_pressure(), shared=["p"], mu=MU, kappa=100.0)
-    shared.fix("bottom", u_x=0.0, u_y=0.0)
-    shared.fix("top", u_x=0.1, u_y=0.0)
-    assert shared.solve().values("p").shape == (1,)
-
-
 def test_reactions_of_ties_and_springs_are_those_of_all_nodes() -> None:
     """Simple shear between periodic sides: P_yx = mu g on the whole of each, not at its corners."""
     study = block_of()

@@ -63,28 +63,6 @@ def test_a_side_that_is_tied_to_a_place_moves_as_one() -> None:
         tied.tie(np.arange(9), "left", "u_x")
 
 
-def test_prescribed_values_that_differ_by_rounding_are_one() -> None:
-    free = Study(Mesh.rectangle(2, 1, cells=(4, 4)))
-    free.add("body", material="hooke", E=1.0, nu=0.3)
-    free.fix("bottom", u_x=0, u_y=0)
-    free.fix("top", u_x=lambda x, t: t * 0.1 * 3 * np.sin(np.pi * x[:, 0]), u_y=0.3)
-    free.fix("right", u_x=0, u_y=lambda x, t: t * (0.1 + 0.2) * x[:, 1])
-    assert free.solve().at((2.0, 1.0))["u_y"] == pytest.approx(0.3)
-    free.fix((2.0, 1.0), u_y=0.3 + 1e-9)
-    with pytest.raises(StudyError, match="is prescribed twice"):
-        free.solve()
-
-
-def test_what_cannot_be_varied_by_a_function() -> None:
-    study = plate()
-    study.load("right", u_x=0.1)
-    for value in (lambda x, t: t, "0.1", float("nan"), [1.0, 2.0]):
-        with pytest.raises(StudyError, match=r"varied\(.*(number is|number) needed"):
-            study.varied({("load:right", "u_x"): value})  # type: ignore[dict-item]
-    twice = study.varied({("load:right", "u_x"): 0.2}).solve()
-    np.testing.assert_allclose(twice.x, 2 * study.solve().x, rtol=1e-12)
-
-
 @softehl.page
 def bare(m: Any) -> None:
     """A linear spring of a body, without fields."""

@@ -7,28 +7,15 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-import sympy as sp
 
 import softehl
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.results.result import Result
 from softehl.runtime.study import Study, StudyError
+from tests.runtime.field_pages import rubber
 
 AFFINE = np.array([[0.08, 0.05, -0.02], [-0.03, 0.1, 0.04], [0.02, -0.06, 0.07]])
 """Displacement gradient of the patch tests."""
-
-
-@softehl.page
-def rubber(m):  # type: ignore[no-untyped-def]
-    """Compressible neo-Hooke."""
-    u = m.vector("u")
-    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    W = mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + K / 2 * (J - 1) ** 2
-    m.minimise(W)
-    m.fields(J=J, W=W)
 
 
 def moved(mesh: Mesh) -> Mesh:
@@ -188,28 +175,6 @@ def test_an_axisymmetric_side_has_the_pressure_of_a_thick_tube() -> None:
     assert moved == pytest.approx(inner, rel=1e-4)
 
 
-def test_loads_and_pressures_of_an_axisymmetric_study_act_on_rings() -> None:
-    mesh = Mesh.rectangle(1, 1, cells=(2, 2), order=2).map(lambda x: x + np.array([0.0, 1.0]))
-
-    def solved(how: str) -> Result:
-        study = Study(mesh, geometry="axisymmetric")
-        study.add("rubber", rubber, mu=0.4, K=0.9)
-        study.fix("left", u_x=0, u_y=0)
-        if how == "page":
-            study.add("pressure", followed, on="right", p=lambda t: 0.1 * t)
-        elif how == "pressure":
-            study.pressure("right", 0.1)
-        else:
-            study.load("right", u_x=-0.1)
-        return study.solve(steps=2)
-
-    results = {how: solved(how) for how in ("page", "pressure", "load")}
-    assert np.abs(results["page"].x - results["pressure"].x).max() < 1e-12
-    total = results["load"].reaction("left")["u_x"]
-    assert total == pytest.approx(0.1 * np.pi * (2**2 - 1), rel=1e-9)
-    assert results["pressure"].iterations == results["page"].iterations
-
-
 def test_sides_have_outward_normals_and_values() -> None:
     study = Study(Mesh.rectangle(2, 1, cells=(4, 2), shape="triangle"))
     study.add("plate", laplace, k=3.0)
@@ -217,51 +182,6 @@ def test_sides_have_outward_normals_and_values() -> None:
     study.add("loss", convection, on="right", h=0.5, q=1.0)
     # 3 dT/dx = - (T / 2 + 1) on the right: T = 4 - a x with 3 a = (4 - 2 a) / 2 + 1
     assert study.solve().at((2.0, 0.5))["T"] == pytest.approx(4 - 2 * 3 / 4, rel=1e-12)
-
-
-@softehl.page
-def biot(m):  # type: ignore[no-untyped-def]
-    """Soil whose pores are full of water."""
-    u, p = m.vector("u"), m.scalar("p", order=1)
-    E, k = m.parameters(E="Young's modulus", k="permeability over viscosity")
-    e = (m.grad(u) + m.grad(u).T) / 2
-    m.weak(E * e - p * sp.eye(len(u)), m.grad(u))
-    m.weak(m.grad(m.rate(u)).trace(), p)
-    m.weak(k * m.grad(p), m.grad(p))
-
-
-def test_units_of_time_change_nothing_either() -> None:
-    """Terzaghi's column; rows of the tangent have rates in them, columns have not."""
-
-    def pressures(height: float, E: float, k: float) -> list[float]:
-        study = Study(Mesh.rectangle(height / 4, height, cells=(1, 4), order=2))
-        study.add("soil", biot, E=E, k=k)
-        study.fix("boundary", u_x=0)
-        study.fix("bottom", u_y=0)
-        study.fix("top", p=0)
-        study.load("top", u_y=-1e-3 * E)
-        dt = 0.05 * height**2 / (k * E)
-        return [r.at((0, 0))["p"] / (1e-3 * E) for r in study.march(dt=dt, until=2 * dt)]
-
-    assert pressures(1e-6, 1e11, 1e-18) == pytest.approx(pressures(1.0, 1.0, 1.0), rel=1e-9)
-
-
-def test_a_component_that_is_zero_to_rounding_does_not_choose_the_steps() -> None:
-    """Terzaghi's series at the closed end; u_x is free in the middle, and 1e-20."""
-    study = Study(Mesh.rectangle(0.25, 1, cells=(1, 4), order=2))
-    study.add("soil", biot, E=1.0, k=1.0)
-    study.fix("left", u_x=0)
-    study.fix("right", u_x=0)
-    study.fix("bottom", u_y=0)
-    study.fix("top", p=0)
-    study.load("top", u_y=-1e-3)
-    t = 0.2
-    *_, result = study.march(dt=1e-3, until=t, method="bdf2", tolerance=1e-3)
-    odd = np.arange(1, 20, 2)
-    signs = np.where(odd % 4 == 1, 1.0, -1.0)
-    series = 4 / np.pi * np.sum(signs / odd * np.exp(-((odd * np.pi / 2) ** 2) * t))
-    assert result.at((0.1, 0.0))["p"] / 1e-3 == pytest.approx(series, rel=0.015)
-    assert 0.0 < np.abs(result.values("u_x")).max() < 1e-15
 
 
 @pytest.mark.parametrize("shape", ["quad", "serendipity", "triangle"])
@@ -290,24 +210,3 @@ def darcy(m):  # type: ignore[no-untyped-def]
     p = m.scalar("p", order=1)
     (k,) = m.parameters(k="permeability")
     m.minimise(k / 2 * m.grad(p).dot(m.grad(p)))
-
-
-def test_a_field_is_not_continued_into_a_cell_without_it() -> None:
-    mesh = Mesh.rectangle(2, 1, cells=(2, 1), order=2).with_group("wet", lambda x: x[:, 0] < 1)
-    study = Study(mesh)
-    study.add("flow", darcy, cells="wet", k=1.0)
-    study.add("heat", conduction, k=1.0)
-    study.fix("left", p=1, T=1)
-    result = study.solve()
-    assert result.at((0.3, 0.4))["p"] == pytest.approx(1)
-    assert sorted(result.at((1.7, 0.4))) == ["T"]
-    with pytest.raises(StudyError, match=r"no p at \(1.7, 0.4\); there are T"):
-        result.sensitivity("p", at=(1.7, 0.4), by={"flow": "k"})
-
-
-@softehl.page
-def conduction(m):  # type: ignore[no-untyped-def]
-    """A temperature."""
-    T = m.scalar("T")
-    (k,) = m.parameters(k="conductivity")
-    m.minimise(k / 2 * m.grad(T).dot(m.grad(T)))

@@ -36,14 +36,6 @@ def test_folders_of_results_are_made(path: str, tmp_path: Path) -> None:
     assert (tmp_path / "new" / path / "part.pvd").is_file()
 
 
-def test_folders_of_checkpoints_and_single_results_are_made(tmp_path: Path) -> None:
-    (result,) = PATHS["march"](bar(), checkpoint=tmp_path / "a" / "b" / "last.npz")
-    assert (tmp_path / "a" / "b" / "last.npz").is_file()
-    for name in ("one.vtu", "all.pvtu"):
-        result.write(tmp_path / name[:3] / name)
-        assert (tmp_path / name[:3] / name).is_file()
-
-
 @pytest.mark.parametrize(
     ("path", "word", "name", "message"),
     [
@@ -73,13 +65,9 @@ def test_nothing_is_solved_for_a_place_that_cannot_be_written(
     assert "\n" not in str(caught.value)
 
 
-def test_a_result_that_cannot_be_written_says_so_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    result = bar().solve()
-    for name, message in (
-        ("file/one.vtu", "Not a directory"),
-        ("one.vtk", "results are written as .vtu or .pvtu"),
-    ):
-        with pytest.raises(StudyError, match=message) as caught:
-            result.write(tmp_path / name)
-        assert "\n" not in str(caught.value)
+def test_folders_of_checkpoints_and_single_results_are_made(tmp_path: Path) -> None:
+    (result,) = PATHS["march"](bar(), checkpoint=tmp_path / "a" / "b" / "last.npz")
+    assert (tmp_path / "a" / "b" / "last.npz").is_file()
+    for name in ("one.vtu", "all.pvtu"):
+        result.write(tmp_path / name[:3] / name)
+        assert (tmp_path / name[:3] / name).is_file()

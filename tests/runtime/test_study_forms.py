@@ -12,7 +12,6 @@ import pytest
 from softehl import Definition, Mesh, Model, Study, element, kinematics, load_kernel, quadrature
 from softehl.runtime.analyses.initial_state import beginning
 from softehl.runtime.analyses.motion import stored_energy
-from softehl.runtime.discretisation.dofmap import separate_dofs
 from softehl.runtime.discretisation.matrix_free_products import NoProductError, require_product
 from softehl.runtime.discretisation.quadrature import film_rule
 from softehl.runtime.study import StudyError
@@ -98,29 +97,6 @@ def test_elements_stand_at_places_of_a_field_of_others() -> None:
     q = 7.0 / (1 / 0.4 + 1.0 + 1 / 0.4)
     assert result.values("p") == pytest.approx([7.0 - q / 0.4, 3.5, q / 0.4], rel=1e-12)
     assert beginning(study.system(), result)[1].tolist() == result.x.tolist()
-
-
-def test_lines_may_have_fields_of_their_own() -> None:
-    study = line()
-    study.add("line", diffusion(), along={"p": separate_dofs(2, 4, 0)}, rule=film_rule(4), c=1.0)
-    assert study.system().numbering.layout.count("p") == 10
-    found = study.solve().fields("line")
-    assert found["p"].shape == (2, 5)
-    study = line(1)  # [0, 1] and not [0, 0.5]: nothing ties the two lines
-    study.add("line", diffusion(), along={"p": 4}, c=1.0)
-    x = study.solve().fields("line")
-    assert x["p"] == pytest.approx(x["x"] ** 2 * (3 - 2 * x["x"]), abs=1e-12)
-    assert abs(found["p"] - found["x"] ** 2 * (3 - 2 * found["x"])).max() > 1e-3
-
-
-def test_an_element_between_any_two_nodes_under_another_name() -> None:
-    """Springs of 2 in a chain, and a rope of 3 between its ends: 1 + 3 in all."""
-    study = line()
-    study.add("chain", rope(), called={"u": "u_x"}, k=2.0)
-    study.add("rope", rope(), on=np.array([[0, 2]]), called={"u": "u_x"}, k=3.0)
-    study.fix("left", u_x=0.0)
-    study.load((1.0,), u_x=8.0)
-    assert study.solve().at((1.0,))["u_x"] == pytest.approx(2.0, rel=1e-12)
 
 
 def test_derivatives_and_energies_know_the_rule_of_a_block() -> None:
@@ -214,27 +190,6 @@ def test_two_blocks_share_a_field_along_lines_by_its_places() -> None:
         apart.add(str(cell), diffusion(), on=np.array(cell), along={"p": 2}, c=0.5)
     ends = whole.solve().values("p")[[0, 2, 4]]
     assert apart.solve().values("p") == pytest.approx(ends, rel=1e-12)
-
-
-def test_a_page_without_a_field_along_it_is_told() -> None:
-    with pytest.raises(StudyError, match=r"along = p; rope has none along its elements"):
-        line().add("rope", rope(), along={"p": 2}, k=1.0)
-    assert load_kernel("film").interpolated == "p"
-
-
-def test_a_rule_of_a_page_and_lists_of_nodes_serve_a_field_under_another_name() -> None:
-    study = line()
-    given: dict[str, Any] = {
-        "on": [[0, 1], [1, 2]],
-        "along": {"q": 3},
-        "called": {"p": "q"},
-        "c": 1.0,
-    }
-    study.add("line", diffusion(), rule=quadrature.gauss(5, 1), **given)
-    found = study.solve().fields("line")
-    assert found["x"].shape == (2, 5)
-    x = found["x"]
-    assert found["p"] == pytest.approx(x**2 * (3 - 2 * x), abs=1e-12)
 
 
 SPRINGS = """

@@ -223,3 +223,24 @@ def test_a_material_that_does_not_ship_is_an_error_with_those_that_do() -> None:
 def test_a_law_by_name_says_what_its_arguments_must_be(given: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         sheared(**given)
+
+
+@softehl.material
+def saint_venant(m: Material) -> None:
+    """An energy of the strain."""
+    mu, lame = m.parameters(mu="shear modulus [MPa]", lame="first Lame parameter [MPa]")
+    E = m.green
+    m.energy(lame / 2 * E.trace() ** 2 + mu * (E.T * E).trace())
+
+
+@softehl.material
+def second(m: Material) -> None:
+    """The same law as a second Piola-Kirchhoff stress."""
+    mu, lame = m.parameters(mu="shear modulus [MPa]", lame="first Lame parameter [MPa]")
+    m.second_stress(lame * m.green.trace() * sp.eye(3) + 2 * mu * m.green)
+
+
+def test_an_energy_of_the_strain_and_its_second_stress_are_one_material() -> None:
+    a = sheared("axisymmetric", material=saint_venant, mu=0.4, lame=0.6)
+    b = sheared("axisymmetric", material=second, mu=0.4, lame=0.6)
+    assert np.abs(a.x - b.x).max() < 1e-12

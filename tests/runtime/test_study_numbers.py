@@ -34,14 +34,6 @@ def test_numbers_of_numpy_and_sympy_are_numbers() -> None:
     assert found == usual.solve().at((1, 1))
 
 
-def test_a_mesh_of_lists_is_that_of_arrays() -> None:
-    study = held(Mesh(SQUARE, {"quad4": [[0, 1, 2, 3]]}))  # type: ignore[arg-type, dict-item]
-    study.load((1, 1), u_x=0.01)
-    other = held(Mesh(np.array(SQUARE, float), {"quad4": np.array([[0, 1, 2, 3]])}))
-    other.load((1, 1), u_x=0.01)
-    assert study.solve().at((1, 0.5)) == other.solve().at((1, 0.5))
-
-
 @pytest.mark.parametrize(
     ("call", "words"),
     [

@@ -81,13 +81,6 @@ def test_loads_and_supports_that_are_added_count() -> None:
     assert (again.t, left(again), again.at((1.0,))["u"]) == pytest.approx((1.0, 3.0, 5.0))
 
 
-def test_a_load_factor_of_zero_is_solved_once() -> None:
-    study = sprung(2.0)
-    study.load((0.0,), u=lambda x, t: 3.0 - t)
-    found = study.solve(until=0.0, steps=3)
-    assert (found.t, left(found)) == pytest.approx((0.0, 1.5))
-
-
 def test_histories_and_unknowns_of_elements_go_on() -> None:
     study = sprung(2.0)
     study.add("multiplier", multiplier(), on="left", c=3.0)
@@ -120,17 +113,6 @@ def test_what_does_not_fit_is_refused() -> None:
         fewer.solve(start=first)
     with pytest.raises(StudyError, match="give one of them"):
         sprung(1.0).march(dt=0.1, until=2.0, start=first, restart="rod.npz")
-
-
-def test_values_at_the_start_add_up_and_the_later_ones_win() -> None:
-    study = sprung(1.0, Mesh.line(1.0, cells=2))
-    study.add("middle", spring(), on=lambda x: x[:, 0] == 0.5, k=1.0)
-    study.start(u=3.0)
-    study.start("left", u=1.0)
-    study.start("right", u=2.0)
-    found = study.system().at_rest()
-    assert sorted(found.tolist()) == [1.0, 2.0, 3.0]
-    assert study.system().at_rest()[study.system().numbering.nodal["u"][0]] == 1.0
 
 
 def test_a_study_that_is_changed_on_its_way_is_an_error() -> None:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from softehl import Mesh, Study
-from softehl.runtime.contact.body_thickness import in_chains, inner_radii, thickness
 from softehl.runtime.contact.search import TouchingProblem
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.mesh.mesh import MeshError
@@ -54,18 +53,6 @@ def test_a_uniform_pressure_passes_between_meshes_that_do_not_match(
     pressure = study.solve(start=result).fields("contact")["pressure"]
     assert np.ptp(pressure) < 1e-10 * pressure.max()
     assert pressure.min() > 0.1
-
-
-@pytest.mark.parametrize("apart", [0.05, 0.0, -0.05])
-def test_bodies_may_start_apart_or_overlap(apart: float) -> None:
-    study = stacked(1, 1, apart=apart)
-    study.fix("lower:bottom", u_x=0, u_y=0)
-    study.fix("upper:top", u_x=0, u_y=-0.1 - apart)
-    touching = stacked(1, 1)
-    touching.fix("lower:bottom", u_x=0, u_y=0)
-    touching.fix("upper:top", u_x=0, u_y=-0.1)
-    expected = force(touching.solve())
-    assert force(study.solve()) == pytest.approx(expected, rel=0.15 * abs(apart) / 0.05 + 1e-9)
 
 
 def test_a_body_that_only_contact_could_hold_is_told() -> None:
@@ -144,37 +131,6 @@ def test_hertz() -> None:
     assert np.sqrt(4 * second / P) == pytest.approx(a, rel=0.02)  # a^2 / 4 of the half ellipse
 
 
-def rolled(friction: float) -> tuple[list[Result], Result]:
-    """A disc of radius 2, pressed 0.1 mm and rolled 1 mm over a block; every step."""
-    R, d, way = 2.0, 0.1, 1.0
-    block = Mesh.rectangle(8, 2, cells=(20, 4), order=2).map(lambda x: x - [4, 2])
-    mesh = Mesh.union(disc=lower_disc(12, R, 2, rate=0), block=block)
-    study = Study(mesh)
-    study.add("body", elastic, **RUBBER)
-    study.contact("disc:bottom", "block:top", friction=friction)
-    study.fix("block:bottom", u_x=0, u_y=0)
-
-    def motion(x: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-        done = way * max(t - 1, 0)
-        X, c, s = x - [0, R], np.cos(done / (R - d / 2)), np.sin(done / (R - d / 2))
-        along = c * X[:, 0] + s * X[:, 1] - X[:, 0] + done - way / 2
-        return along, c * X[:, 1] - s * X[:, 0] - X[:, 1] - d * min(t, 1)
-
-    study.fix("disc:top", u_x=lambda x, t: motion(x, t)[0], u_y=lambda x, t: motion(x, t)[1])
-    steps: list[Result] = []
-    pressed = study.solve(steps=3)
-    study.solve(steps=12, start=pressed, until=2.0, on_step=steps.append)
-    return steps, pressed
-
-
-def test_a_disc_rolls_without_chatter() -> None:
-    steps, _ = rolled(0.3)
-    reaction = np.array([r.reaction("block:bottom")["u_y"] for r in steps])
-    trend = np.polyval(np.polyfit(np.arange(len(reaction)), reaction, 2), np.arange(len(reaction)))
-    assert np.abs(reaction - trend).max() < 0.01 * reaction.mean()
-    assert max(r.iterations for r in steps) <= 6
-
-
 def ironed(friction: float) -> list[Result]:
     """A stiff die of radius 0.75, pressed 0.2 mm into a block and drawn along it by 1.5 mm."""
     die = lower_disc(8, 0.75, 1, rate=0)
@@ -203,22 +159,6 @@ def test_ironing_slips_at_the_coefficient_of_friction() -> None:
         assert abs(q) == pytest.approx(0.3 * p, rel=1e-6)
     pull = [r.reaction("block:bottom") for r in steps]
     assert pull[-1]["u_x"] < -0.2 * pull[-1]["u_y"]
-
-
-def test_friction_holds_what_it_can_hold() -> None:
-    """Below the limit nothing slips: the blocks shear as one."""
-    study = stacked(1, 1, friction=0.5)
-    study.fix("lower:bottom", u_x=0, u_y=0)
-    study.fix(
-        "upper:top",
-        u_x=lambda x, t: 0.02 * max(t - 1, 0) + 0 * x[:, 0],
-        u_y=lambda x, t: -0.2 * min(t, 1) + 0 * x[:, 0],
-    )
-    pressed = study.solve()
-    sheared = study.solve(start=pressed, until=2.0)
-    lower, upper = (sheared.at((0.5, y))["u_x"] for y in (1.999, 2.001))
-    assert lower == pytest.approx(upper, abs=1e-4)
-    assert lower > 0.005
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -272,20 +212,6 @@ def test_a_union_has_the_names_of_its_parts() -> None:
         Mesh.union(disc=disc, bar=Mesh.line(1, cells=1))
     with pytest.raises(MeshError, match="disc is str"):
         Mesh.union(disc="disc")  # type: ignore[arg-type]
-
-
-def test_how_thick_a_body_is() -> None:
-    mesh = Mesh.rectangle(4, 1, cells=(8, 2))
-    bottom = mesh.faces("bottom")["line2"]
-    assert thickness(mesh.points, mesh.boundary, bottom).tolist() == [1.0] * 8
-    radii = inner_radii(mesh.points, mesh.boundary, bottom)
-    assert sorted(radii.round(9))[:2] == [0.25, 0.25]  # towards the corners
-    assert radii.max() == pytest.approx(0.5)
-
-
-def test_chains_are_put_in_order() -> None:
-    lines = np.array([[3, 4], [0, 1], [1, 2], [4, 3], [2, 5]])
-    assert in_chains(lines).tolist() == [[0, 1], [1, 2], [2, 5], [3, 4], [4, 3]]
 
 
 @pytest.mark.parametrize("sides", [("upper:bottom", "lower:top"), ("lower:top", "upper:bottom")])

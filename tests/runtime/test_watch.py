@@ -14,11 +14,9 @@ import pytest
 
 from softehl import Mesh, Study
 from softehl.runtime.analyses.callbacks import Series, read_series
-from softehl.runtime.mesh.cells import for_vtk
 from softehl.runtime.results.result import Result
 from softehl.runtime.study import StudyError
 from tests.runtime import solid_page as pages
-from tests.runtime.test_study_elements import EVERY, poisson, unit_mesh
 
 
 def pulled() -> Study:
@@ -83,26 +81,6 @@ def test_a_march_that_goes_on_continues_its_series(tmp_path: Path) -> None:
     assert [t for t, _ in whole(path)] == [0.5, 1.0]
 
 
-def test_following_writes_a_series_too(tmp_path: Path) -> None:
-    path = tmp_path / "part.pvd"
-    found = pulled().follow(step=0.5, until=lambda r: r.t >= 1.0, write=path)
-    assert [t for t, _ in whole(path)] == [r.t for r in found.results]
-
-
-@pytest.mark.parametrize("kind", EVERY)
-def test_every_kind_of_cell_is_written(kind: str, tmp_path: Path) -> None:
-    study = Study(unit_mesh(kind, 2))
-    study.add("body", poisson(kind), k=2.0)
-    study.fix("boundary", u=0.0)
-    result = study.solve(write=tmp_path / "u.pvd")
-    (_, (t, mesh)) = whole(tmp_path / "u.pvd")
-    assert t == 1.0
-    ((_, nodes),) = study.mesh.cells.items()
-    np.testing.assert_array_equal(for_vtk(kind, mesh.cells[0].data), nodes)
-    np.testing.assert_array_equal(mesh.point_data["u"], result.values("u"))
-    assert mesh.cell_data["body.u"][0].shape == (len(nodes),)
-
-
 def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match=r"write = '.*part.vtu': a series .* is written as .pvd"):
         pulled().solve(write=tmp_path / "part.vtu")
@@ -130,16 +108,6 @@ def test_a_terminal_has_one_line_and_a_pipe_none(monkeypatch: pytest.MonkeyPatch
         if lines:
             last = f"step 2: load factor 1 of 1, {result.iterations} iterations, "
             assert last in said
-
-
-def test_a_march_tells_its_time(capsys: pytest.CaptureFixture[str]) -> None:
-    for _ in pulled().march(dt=0.5, until=1.0, progress=True):
-        pass
-    told = capsys.readouterr().err.splitlines()
-    assert [line.rpartition(",")[0].rpartition(",")[0] for line in told] == [
-        "step 1: t 0.5 of 1",
-        "step 2: t 1 of 1",
-    ]
 
 
 def test_steps_go_to_the_log_whether_they_are_shown_or_not(

@@ -10,12 +10,9 @@ import pytest
 from hypothesis import given
 
 from softehl.codegen import pipeline
-from softehl.codegen.abi import TargetError
-from softehl.codegen.hosts import registry
 from softehl.codegen.hosts.element_interface import Before, ElementInterface, Given, Timed
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.models import ALL
-from softehl.codegen.tools import cli, host_files
+from softehl.codegen.tools import cli
 from tests.codegen import field_pages
 from tests.codegen.hosts.random_pages import FEW, A, K, page, pages
 from tests.codegen.hosts.workshop import errors, folder, made, off_python
@@ -83,20 +80,6 @@ def test_random_pages_give_what_their_python_kernels_give(
     assert off_python(d, place) < 1e-13
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
-@FEW
-@given(d=pages())
-def test_random_pages_in_cpp(d: Definition, tmp_path_factory: pytest.TempPathFactory) -> None:
-    place = folder(d, "cpp", tmp_path_factory.mktemp("cpp"))
-    assert made(place, "lib").returncode == 0
-    assert off_python(d, place) < 1e-13
-    done = made(place)
-    assert done.returncode == 0, done.stdout + done.stderr
-    values = 5 if d.conservative else 4
-    assert max(errors(done.stdout)[:values]) < 1e-13
-
-
 # -------------------------------------------------------------------------------- the description
 
 
@@ -119,18 +102,6 @@ def test_rates_come_from_the_step_in_time() -> None:
     seen = ElementInterface.of(heat, "c")
     assert seen.parameters == [Given(0), Given(1), Timed("rate")]
     assert seen.data == [Before(0, rate=True), Before(1, rate=True)]
-
-
-@pytest.mark.parametrize("host", [t for t in registry.BUILT_IN if registry.host(t).element])
-def test_an_interpolated_field_is_refused(host: str) -> None:
-    said = rf"film interpolates p .* target {host} needs a fixed number"
-    with pytest.raises(TargetError, match=said):
-        host_files.files(ALL["film"](), host)
-
-
-def test_a_page_and_a_folder_are_needed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.generate([NEO_HOOKE], target="c") == 2
-    assert "target c needs a MODEL.py and --out FOLDER" in capsys.readouterr().err
 
 
 def test_a_folder_of_somebody_else_stays(

@@ -102,15 +102,6 @@ def test_the_driver_sees_a_fault(host: str, name: str, old: str, new: str, tmp_p
     assert "FAILED" in done.stdout
 
 
-def test_the_deck_has_state_and_fields(tmp_path: Path) -> None:
-    folder(j2, "abaqus", tmp_path)
-    notes = (tmp_path / "NOTES.md").read_text()
-    deck = (tmp_path / "j2.inp").read_text()
-    assert "\n** give your values: G, K, sy, H\n80.0, 170.0, 0.5, 10.0\n*DEPVAR\n7\n" in deck
-    assert "holds p_xx, p_yy, p_xy, p_xz, p_yz, alpha; then" in notes
-    assert "which may be left out: mises." in notes
-
-
 @softehl.material
 def sliding(m: Material) -> None:
     """A stress whose modulus is not symmetric."""

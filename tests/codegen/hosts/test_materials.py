@@ -17,7 +17,7 @@ import softehl
 from softehl.codegen.abi import TargetError
 from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.evaluation import State, Walk
-from softehl.codegen.hosts.material_response import VOIGT, Measure, Response, response, solid
+from softehl.codegen.hosts.material_response import VOIGT, Measure, Response, response
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.language.model import Model
@@ -153,17 +153,6 @@ def test_the_cell_sees_a_fault(host: str, name: str, old: str, new: str, tmp_pat
     assert "FAILED" in done.stdout
 
 
-def test_a_law_in_a_page_of_a_study() -> None:
-    """Uniaxial strain: P = mu (l - 1 / l) + K (l - 1)."""
-    study = softehl.Study(softehl.Mesh.box((1, 1, 1), cells=(1, 1, 1), shape="tetrahedron"))
-    study.add("body", solid(neo), mu=MU, K=BULK)
-    study.fix("left", u_x=0)
-    study.fix("right", u_x=0.3)
-    study.fix(np.arange(8), u_y=0, u_z=0)
-    pull = study.solve().reaction("right")["u_x"]
-    assert pull == pytest.approx(MU * (1.3 - 1 / 1.3) + BULK * 0.3, rel=1e-12)
-
-
 # -------------------------------------------------------------------------------- what is refused
 
 
@@ -175,13 +164,6 @@ def test_an_energy_that_changes_with_a_rotation_is_refused() -> None:
 def test_calculix_needs_an_energy() -> None:
     with pytest.raises(TargetError, match="the modulus of fluid is not symmetric at a random"):
         host_files.files(fluid, "calculix")
-
-
-def test_a_host_takes_what_it_can() -> None:
-    with pytest.raises(TargetError, match="neo is a material: target ngsolve takes elements"):
-        host_files.files(neo, "ngsolve")
-    with pytest.raises(TargetError, match="neo_tet4 is an element: target calculix takes mat"):
-        host_files.files(solid(neo), "calculix")
 
 
 def test_a_file_of_materials(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
