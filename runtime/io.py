@@ -36,8 +36,8 @@ def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
     Its name is fixed, so what a killed run leaves behind is overwritten by the next one; where
     several processes may write the file (shared), each has a name of its own.
     """
-    own = f".{uuid.uuid4().hex}" if shared else ""
-    temporary = path.with_name(f".{path.name}{own}.part")
+    suffix = f".{uuid.uuid4().hex}" if shared else ""
+    temporary = path.with_name(f".{path.name}{suffix}.part")
     try:
         yield temporary
         _flush(temporary)

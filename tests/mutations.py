@@ -416,8 +416,8 @@ FAULTS = (
     ),
     Fault(
         "runtime/discretisation/dofmap.py",
-        "places in block.along.items() for column",
-        "places in reversed(block.along.items()) for column",
+        "points in block.along.items() for column",
+        "points in reversed(block.along.items()) for column",
         "tests/cases/test_cycle.py",
     ),
     Fault(

@@ -17,22 +17,22 @@ def thickness(points: Array, boundary: Faces, faces: Integers) -> Array:
     """Distance (n,) from faces (n, k) of a boundary to the nearest face of it that lies beneath
     and looks the other way; infinite where there is none.
     """
-    found = np.full(len(faces), np.inf)
+    thicknesses = np.full(len(faces), np.inf)
     for k, (below, distance, cosine) in enumerate(_beneath(points, boundary, faces)):
-        meant = (cosine < _OPPOSITE) & (below > _BENEATH * distance)
-        found[k] = distance[meant].min(initial=np.inf)
-    return found
+        opposite = (cosine < _OPPOSITE) & (below > _BENEATH * distance)
+        thicknesses[k] = distance[opposite].min(initial=np.inf)
+    return thicknesses
 
 
 def inner_radii(points: Array, boundary: Faces, faces: Integers) -> Array:
     """Radius (n,) of the largest circle inside that touches each line from within: half of the
     thickness, and towards a corner of the body less and less.
     """
-    found = np.full(len(faces), np.inf)
+    radii = np.full(len(faces), np.inf)
     for k, (below, distance, _) in enumerate(_beneath(points, boundary, faces)):
-        meant = below > 1e-9 * distance
-        found[k] = (distance[meant] ** 2 / (2.0 * below[meant])).min(initial=np.inf)
-    return found
+        mask = below > 1e-9 * distance
+        radii[k] = (distance[mask] ** 2 / (2.0 * below[mask])).min(initial=np.inf)
+    return radii
 
 
 def _beneath(
@@ -72,10 +72,10 @@ def by_normals(points: Array, faces: Integers) -> Integers:
 def _centres_and_normals(points: Array, faces: Integers) -> tuple[Array, Array]:
     """Of lines or faces (n, k) as their body has them; normals look outward, of length one."""
     if points.shape[1] == 2:
-        ends = points[faces[:, :2]]
-        along = ends[:, 1] - ends[:, 0]
+        end_points = points[faces[:, :2]]
+        along = end_points[:, 1] - end_points[:, 0]
         across = np.stack([along[:, 1], -along[:, 0]], axis=1)
     else:
-        ends = points[faces[:, : 4 if faces.shape[1] in (4, 8, 9) else 3]]
-        across = np.cross(ends[:, 1] - ends[:, 0], ends[:, -1] - ends[:, 0])
-    return ends.mean(axis=1), across / np.linalg.norm(across, axis=1, keepdims=True)
+        end_points = points[faces[:, : 4 if faces.shape[1] in (4, 8, 9) else 3]]
+        across = np.cross(end_points[:, 1] - end_points[:, 0], end_points[:, -1] - end_points[:, 0])
+    return end_points.mean(axis=1), across / np.linalg.norm(across, axis=1, keepdims=True)

@@ -37,52 +37,54 @@ def common_part(one: Cell, mine: Array, other: Cell, theirs: Array) -> Triangles
     inside, within = _inside(S, M[:, ::-1]), _inside(M, S)
     alpha, beta, crosses = _crossings(S, M)
     n = len(mine)
-    told = np.zeros((n, a + b + a * b, CORNER))
-    told[:, :a, :2], told[:, :a, 6:8] = one.nodes[:a], other.nodes[:b].mean(axis=0)
-    told[:, :a, [8, 11]] = 1.0
-    told[:, a : a + b, :2], told[:, a : a + b, 6:8] = parents(one, S, M), other.nodes[:b]
-    told[:, a : a + b, [2, 5]] = 1.0
+    motion = np.zeros((n, a + b + a * b, CORNER))
+    motion[:, :a, :2], motion[:, :a, 6:8] = one.nodes[:a], other.nodes[:b].mean(axis=0)
+    motion[:, :a, [8, 11]] = 1.0
+    motion[:, a : a + b, :2], motion[:, a : a + b, 6:8] = parents(one, S, M), other.nodes[:b]
+    motion[:, a : a + b, [2, 5]] = 1.0
     along, across = (
         np.roll(c.nodes[:k], -1, axis=0) - c.nodes[:k] for c, k in ((one, a), (other, b))
     )
     i, j = (v.ravel() for v in np.indices((a, b)))
-    told[:, a + b :, :2] = one.nodes[i] + alpha[:, :, None] * along[i]
-    told[:, a + b :, 6:8] = other.nodes[j] + beta[:, :, None] * across[j]
-    told[:, a + b :, 2:4], told[:, a + b :, 10:12] = along[i], across[j]
+    motion[:, a + b :, :2] = one.nodes[i] + alpha[:, :, None] * along[i]
+    motion[:, a + b :, 6:8] = other.nodes[j] + beta[:, :, None] * across[j]
+    motion[:, a + b :, 2:4], motion[:, a + b :, 10:12] = along[i], across[j]
     points = np.concatenate(
         [S, M, S[:, i] + alpha[:, :, None] * (np.roll(S, -1, axis=1) - S)[:, i]], axis=1
     )
     valid = _once(points, np.concatenate([inside, within, crosses], axis=1), S)
-    return _fan(points, valid, told)
+    return _fan(points, valid, motion)
 
 
 def parents(cell: Cell, corners: Array, places: Array) -> Array:
     """Parent coordinates (n, m, 2) in faces with flat corners (n, k, 2) of places (n, m, 2)."""
     n, m = places.shape[:2]
-    found = np.tile(cell.nodes[: cell.corners].mean(axis=0), (n * m, 1))
+    xi = np.tile(cell.nodes[: cell.corners].mean(axis=0), (n * m, 1))
     x, target = np.repeat(corners, m, axis=0), places.reshape(n * m, 2)
     flat = _linear(cell)
     with np.errstate(all="ignore"):
         for _ in range(1 if cell.corners == 3 else _ITERATIONS):
-            off = target - np.einsum("nk,nkc->nc", flat.shape(found), x)
-            K = np.einsum("nkd,nkc->ncd", flat.gradient(found), x)
+            error = target - np.einsum("nk,nkc->nc", flat.shape(xi), x)
+            K = np.einsum("nkd,nkc->ncd", flat.gradient(xi), x)
             det = K[:, 0, 0] * K[:, 1, 1] - K[:, 0, 1] * K[:, 1, 0]
             step = np.stack(
                 [
-                    K[:, 1, 1] * off[:, 0] - K[:, 0, 1] * off[:, 1],
-                    K[:, 0, 0] * off[:, 1] - K[:, 1, 0] * off[:, 0],
+                    K[:, 1, 1] * error[:, 0] - K[:, 0, 1] * error[:, 1],
+                    K[:, 0, 0] * error[:, 1] - K[:, 1, 0] * error[:, 0],
                 ],
                 axis=1,
             )
-            found = found + np.clip(np.nan_to_num(step / det[:, None]), -10.0, 10.0)
-    return found.reshape(n, m, 2)
+            xi = xi + np.clip(np.nan_to_num(step / det[:, None]), -10.0, 10.0)
+    return xi.reshape(n, m, 2)
 
 
 def mean_normal(cell: Cell, corners: Array) -> Array:
     """Unit normals (n, 3) in the middle of faces with corners (n, k, 3)."""
     middle = cell.nodes[: cell.corners].mean(axis=0)[None]
-    slopes = np.einsum("kd,nkc->ncd", _linear(cell).gradient(middle)[0], corners[:, : cell.corners])
-    across = np.cross(slopes[:, :, 0], slopes[:, :, 1])
+    gradient = np.einsum(
+        "kd,nkc->ncd", _linear(cell).gradient(middle)[0], corners[:, : cell.corners]
+    )
+    across = np.cross(gradient[:, :, 0], gradient[:, :, 1])
     return np.asarray(across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300))
 
 
@@ -103,8 +105,8 @@ def _inside(points: Array, polygon: Array) -> Flags:
     """True for points (n, k, 2) in convex polygons (n, m, 2) that go round counterclockwise."""
     edge = np.roll(polygon, -1, axis=1) - polygon
     length = np.maximum(np.linalg.norm(edge, axis=2), 1e-300)
-    off = points[:, :, None] - polygon[:, None]
-    left = edge[:, None, :, 0] * off[..., 1] - edge[:, None, :, 1] * off[..., 0]
+    offsets = points[:, :, None] - polygon[:, None]
+    left = edge[:, None, :, 0] * offsets[..., 1] - edge[:, None, :, 1] * offsets[..., 0]
     return np.asarray((left >= -_ON * (length**2)[:, None]).all(axis=2))
 
 
@@ -112,17 +114,17 @@ def _crossings(S: Array, M: Array) -> tuple[Array, Array, Flags]:
     """Shares (n, a b) of the edges of both at which they cross, and whether they do."""
     n, a, b = len(S), S.shape[1], M.shape[1]
     e, f = (np.roll(x, -1, axis=1) - x for x in (S, M))
-    e, f, off = e[:, :, None], f[:, None], M[:, None] - S[:, :, None]
+    e, f, offsets = e[:, :, None], f[:, None], M[:, None] - S[:, :, None]
     det = e[..., 0] * f[..., 1] - e[..., 1] * f[..., 0]
     size = np.linalg.norm(e, axis=3) * np.linalg.norm(f, axis=3)
-    apart = np.abs(det) > _ON * size
-    det = np.where(apart, det, 1.0)
-    alpha = (off[..., 0] * f[..., 1] - off[..., 1] * f[..., 0]) / det
-    beta = (off[..., 0] * e[..., 1] - off[..., 1] * e[..., 0]) / det
+    crossing = np.abs(det) > _ON * size
+    det = np.where(crossing, det, 1.0)
+    alpha = (offsets[..., 0] * f[..., 1] - offsets[..., 1] * f[..., 0]) / det
+    beta = (offsets[..., 0] * e[..., 1] - offsets[..., 1] * e[..., 0]) / det
     for share in (alpha, beta):
-        apart &= (share > _ON) & (share < 1.0 - _ON)
-    alpha, beta = (np.where(apart, v, 0.0).reshape(n, a * b) for v in (alpha, beta))
-    return alpha, beta, apart.reshape(n, a * b)
+        crossing &= (share > _ON) & (share < 1.0 - _ON)
+    alpha, beta = (np.where(crossing, v, 0.0).reshape(n, a * b) for v in (alpha, beta))
+    return alpha, beta, crossing.reshape(n, a * b)
 
 
 def _once(points: Array, valid: Flags, S: Array) -> Flags:
@@ -138,15 +140,15 @@ def _fan(points: Array, valid: Flags, told: Array) -> Triangles:
     """Triangles of the convex hull of the valid points of each pair."""
     count = valid.sum(axis=1)
     mean = (points * valid[:, :, None]).sum(axis=1) / np.maximum(count, 1)[:, None]
-    off = points - mean[:, None]
-    angle = np.where(valid, np.arctan2(off[..., 1], off[..., 0]), np.inf)
+    offsets = points - mean[:, None]
+    angle = np.where(valid, np.arctan2(offsets[..., 1], offsets[..., 0]), np.inf)
     order = np.argsort(angle, axis=1, kind="stable")
     pairs, corners = [], []
     for k in range(1, max(int(count.max(initial=0)) - 1, 1)):
-        there = np.flatnonzero(count > k + 1)
-        chosen = order[there][:, [0, k, k + 1]]
-        pairs.append(there)
-        corners.append(told[there[:, None], chosen])
-    found = np.concatenate([np.empty(0, np.int64), *pairs])
-    sort = np.argsort(found, kind="stable")
-    return Triangles(found[sort], np.concatenate([np.empty((0, 3, CORNER)), *corners])[sort])
+        pair = np.flatnonzero(count > k + 1)
+        triangle = order[pair][:, [0, k, k + 1]]
+        pairs.append(pair)
+        corners.append(told[pair[:, None], triangle])
+    pair_numbers = np.concatenate([np.empty(0, np.int64), *pairs])
+    sort = np.argsort(pair_numbers, kind="stable")
+    return Triangles(pair_numbers[sort], np.concatenate([np.empty((0, 3, CORNER)), *corners])[sort])

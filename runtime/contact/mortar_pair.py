@@ -73,7 +73,7 @@ class FacePair:
         n, width = len(R), 3 * at.nodes
         z, dz = point.inputs
         law = np.concatenate([z, at.limits], axis=1)
-        f, slopes = self.law.tangent(
+        f, derivatives = self.law.tangent(
             np.empty((n, 0)),
             np.ascontiguousarray(law[:, :16]),
             data=np.ascontiguousarray(law[:, 16:]),
@@ -82,7 +82,7 @@ class FacePair:
         W, dW = weight
         rows = [0, 1, 2, 12, 13, 14, 15]
         f = f[:, rows]
-        df = W[:, None, None] * np.einsum("nij,njm->nim", slopes[:, rows], dz)
+        df = W[:, None, None] * np.einsum("nij,njm->nim", derivatives[:, rows], dz)
         df += f[:, :, None] * dW[:, None]
         f = W[:, None] * f
         for part, columns, (S, dS) in (
@@ -124,10 +124,10 @@ class _Places:
     def of(cls, pair: FacePair, coordinates: Array, dofs: Array, data: Array) -> _Places:
         n, width = len(dofs), coordinates.shape[1]
         X = coordinates.reshape(n, -1, 3)
-        x, before = (X + v[:, :width].reshape(X.shape) for v in (dofs, data))
+        x, previous = (X + v[:, :width].reshape(X.shape) for v in (dofs, data))
         corners = data[:, width + 4 :].reshape(n, 3, CORNER)
         multipliers = dofs[:, width:].reshape(n, -1, MULTIPLIERS)
-        return cls(pair, X, x, before, multipliers, data[:, width : width + 4], corners)
+        return cls(pair, X, x, previous, multipliers, data[:, width : width + 4], corners)
 
     @property
     def nodes(self) -> int:
@@ -152,28 +152,31 @@ class _Places:
     def points(self) -> Iterator[tuple[_Varied, _Point]]:
         """Weights and points of the rule of a triangle."""
         normal = self._normal()
-        start, *ends = (self._corner(k, normal) for k in range(3))
-        along, across = (_minus(end, start) for end in ends)
-        part = _triple(along, across, normal)
-        there = part[0] > 0.0
-        part = part[0] * there, part[1] * there[:, None]
+        start, *other_corners = (self._corner(k, normal) for k in range(3))
+        along, across = (_minus(end, start) for end in other_corners)
+        area = _triple(along, across, normal)
+        positive = area[0] > 0.0
+        area = area[0] * positive, area[1] * positive[:, None]
         for (s, t), weight in zip(*_rule(self.pair), strict=True):
             z = _plus(start, _plus(_times(s, along), _times(t, across)))
             xi = self._met(self.pair.one, self.mine, z, normal)
             slope = self._slopes(self.pair.one, self.mine, xi)
             first, second = ((slope[0][:, :, d], slope[1][:, :, d]) for d in (0, 1))
-            share = _over(self._area(*xi), _triple(first, second, normal))
+            area_ratio = _over(self._area(*xi), _triple(first, second, normal))
             yield (
-                _product(_times(weight, part), share),
+                _product(_times(weight, area), area_ratio),
                 self._point(xi, self._met(self.pair.other, self.theirs, z, normal), first, second),
             )
 
     def _point(self, xi: _Varied, eta: _Varied, first: _Varied, second: _Varied) -> _Point:
-        one, other, mine, theirs = self.pair.one, self.pair.other, self.mine, self.theirs
-        x, y = self._place(one, self.x, mine, xi), self._place(other, self.x, theirs, eta)
+        one, other, side_nodes, other_nodes = self.pair.one, self.pair.other, self.mine, self.theirs
+        x, y = (
+            self._place(one, self.x, side_nodes, xi),
+            self._place(other, self.x, other_nodes, eta),
+        )
         was, were = (
             self._held(cell, self.before[:, part], at)
-            for cell, part, at in ((one, mine, xi), (other, theirs, eta))
+            for cell, part, at in ((one, side_nodes, xi), (other, other_nodes, eta))
         )
         N, dN = _shapes(one, xi)
         M, dM = _shapes(other, eta)
@@ -184,17 +187,17 @@ class _Places:
             dlam[:, c, 3 * self.nodes + c :: MULTIPLIERS] += L
         parts = [_minus(y, x), first, second, _minus(were, was), (lam, dlam)]
         z, dz = (np.concatenate([p[i] for p in parts], axis=1) for i in (0, 1))
-        shares = np.concatenate([N, -M], axis=1), np.concatenate([dN, -dM], axis=1)
-        return _Point((z, dz), shares, (L, dL))
+        node_weights = np.concatenate([N, -M], axis=1), np.concatenate([dN, -dM], axis=1)
+        return _Point((z, dz), node_weights, (L, dL))
 
     def _place(self, cell: Cell, x: Array, part: slice, at: _Varied) -> _Varied:
         """Place of parent coordinates, with the motion of the nodes."""
-        found, change = self._held(cell, x[:, part], at)
+        point, change = self._held(cell, x[:, part], at)
         shape = cell.shape(at[0])
         numbers = range(self.nodes)[part]
         for c in range(3):
             change[:, c, [3 * i + c for i in numbers]] += shape
-        return found, change
+        return point, change
 
     def _held(self, cell: Cell, x: Array, at: _Varied) -> _Varied:
         """Place of parent coordinates on nodes (n, k, 3) that do not move."""
@@ -205,12 +208,12 @@ class _Places:
         """Slopes (n, 3, 2) of the face."""
         G, dG = _gradients(cell, at)
         x = self.x[:, part]
-        found = np.einsum("nkd,nkc->ncd", G, x)
+        gradient = np.einsum("nkd,nkc->ncd", G, x)
         change = np.einsum("nkdm,nkc->ncdm", dG, x)
         numbers = range(self.nodes)[part]
         for c in range(3):
             change[:, c][:, :, [3 * i + c for i in numbers]] += G.transpose(0, 2, 1)
-        return found, change
+        return gradient, change
 
     def _area(self, xi: Array, dxi: Array) -> _Varied:
         """Area at rest per parent area."""
@@ -231,8 +234,8 @@ class _Places:
         flat = _corners(self.pair.one)
         k = len(flat.nodes)
         middle = np.tile(flat.nodes.mean(axis=0), (len(self.x), 1))
-        still = middle, np.zeros((len(middle), 2, self.ndof))
-        slope, change = self._slopes(flat, slice(0, k), still)
+        xi = middle, np.zeros((len(middle), 2, self.ndof))
+        slope, change = self._slopes(flat, slice(0, k), xi)
         a, b = slope[:, :, 0], slope[:, :, 1]
         across = np.cross(a, b)
         moved = np.cross(change[:, :, 0], b[:, :, None], axis=1)
@@ -244,33 +247,33 @@ class _Places:
 
     def _corner(self, k: int, normal: _Varied) -> _Varied:
         """Place of a corner of the triangle."""
-        told = self.corners[:, k]
-        A = told[:, 2:6].reshape(-1, 2, 2).transpose(0, 2, 1)
-        B = told[:, 8:12].reshape(-1, 2, 2).transpose(0, 2, 1)
-        still = np.zeros((len(told), 2, self.ndof))
+        motion = self.corners[:, k]
+        A = motion[:, 2:6].reshape(-1, 2, 2).transpose(0, 2, 1)
+        B = motion[:, 8:12].reshape(-1, 2, 2).transpose(0, 2, 1)
+        zero = np.zeros((len(motion), 2, self.ndof))
         flat, far = _corners(self.pair.one), _corners(self.pair.other)
         a, b = len(self.pair.one.nodes), len(far.nodes)
-        mine, theirs = slice(0, len(flat.nodes)), slice(a, a + b)
-        xi, eta = (told[:, :2], still), (told[:, 6:8], still)
-        x, y = self._place(flat, self.x, mine, xi), self._place(far, self.x, theirs, eta)
-        K = self._slopes(flat, mine, xi)[0] @ A - self._slopes(far, theirs, eta)[0] @ B
+        side_nodes, other_nodes = slice(0, len(flat.nodes)), slice(a, a + b)
+        xi, eta = (motion[:, :2], zero), (motion[:, 6:8], zero)
+        x, y = self._place(flat, self.x, side_nodes, xi), self._place(far, self.x, other_nodes, eta)
+        K = self._slopes(flat, side_nodes, xi)[0] @ A - self._slopes(far, other_nodes, eta)[0] @ B
         v, dv = _along(K, (y[0] - x[0], y[1] - x[1]), normal)
-        at = told[:, :2] + np.einsum("ndv,nv->nd", A, v), np.einsum("ndv,nvm->ndm", A, dv)
-        return self._place(flat, self.x, mine, at)
+        at = motion[:, :2] + np.einsum("ndv,nv->nd", A, v), np.einsum("ndv,nvm->ndm", A, dv)
+        return self._place(flat, self.x, side_nodes, at)
 
     def _met(self, cell: Cell, part: slice, z: _Varied, normal: _Varied) -> _Varied:
         """Parent coordinates on a face of what lies on the line through z along the normal."""
         at = np.tile(cell.nodes[: cell.corners].mean(axis=0), (len(self.x), 1))
-        still = np.zeros((len(at), 2, self.ndof))
+        zero = np.zeros((len(at), 2, self.ndof))
         for _ in range(_ITERATIONS):
-            there = self._held(cell, self.x[:, part], (at, still))[0]
+            point = self._held(cell, self.x[:, part], (at, zero))[0]
             K = -np.einsum("nkd,nkc->ncd", cell.gradient(at), self.x[:, part])
-            step = _solved(K, normal[0], there - z[0])[:, :2]
+            step = _solved(K, normal[0], point - z[0])[:, :2]
             at = at + np.clip(step, -2.0, 2.0)
             if np.abs(step).max(initial=0.0) < 1e-14:
                 break
-        K = -self._slopes(cell, part, (at, still))[0]
-        return at, _along(K, _minus(self._place(cell, self.x, part, (at, still)), z), normal)[1]
+        K = -self._slopes(cell, part, (at, zero))[0]
+        return at, _along(K, _minus(self._place(cell, self.x, part, (at, zero)), z), normal)[1]
 
 
 def _plus(a: _Varied, b: _Varied) -> _Varied:
@@ -292,8 +295,8 @@ def _product(a: _Varied, b: _Varied) -> _Varied:
 
 def _over(a: _Varied, b: _Varied) -> _Varied:
     """Of scalars (n,)."""
-    found = a[0] / b[0]
-    return found, (a[1] - found[:, None] * b[1]) / b[0][:, None]
+    ratio = a[0] / b[0]
+    return ratio, (a[1] - ratio[:, None] * b[1]) / b[0][:, None]
 
 
 def _triple(a: _Varied, b: _Varied, c: _Varied) -> _Varied:
@@ -314,13 +317,13 @@ def _along(K: Array, off: _Varied, normal: _Varied) -> _Varied:
 
 def _solved(K: Array, n: Array, right: Array) -> Array:
     """Solution (n, 3, ...) of the columns of K (n, 3, 2) and n (n, 3); nan if any is singular."""
-    whole = np.concatenate([K, n[:, :, None]], axis=2)
+    matrix = np.concatenate([K, n[:, :, None]], axis=2)
     flat = right.ndim == 2
     try:
-        found = np.linalg.solve(whole, right[:, :, None] if flat else right)
+        solution = np.linalg.solve(matrix, right[:, :, None] if flat else right)
     except np.linalg.LinAlgError:
         return np.full(right.shape, np.nan)
-    return np.asarray(found[:, :, 0] if flat else found)
+    return np.asarray(solution[:, :, 0] if flat else solution)
 
 
 def _shapes(cell: Cell, at: _Varied) -> _Varied:

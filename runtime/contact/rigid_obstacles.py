@@ -56,9 +56,9 @@ def tributary_areas(points: Array, segments: Integers, nodes: Integers) -> Array
     of all nodes of a chain add up to its surface; segments are weighted one by one, so that
     the multiplier of an end node counts only the half segment that it has.
     """
-    ends = points[segments]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    radius = np.abs(ends[:, :, 1])
+    end_points = points[segments]
+    length = np.linalg.norm(end_points[:, 1] - end_points[:, 0], axis=1)
+    radius = np.abs(end_points[:, :, 1])
     first = 2.0 * np.pi * length * (2.0 * radius[:, 0] + radius[:, 1]) / 6.0
     second = 2.0 * np.pi * length * (radius[:, 0] + 2.0 * radius[:, 1]) / 6.0
     total = np.bincount(segments[:, 0], first, len(points))

@@ -72,39 +72,41 @@ class Contact:
         """Its blocks without elements, which keep their places."""
         none = np.empty(0, dtype=np.int64)
         x = np.zeros(int(max(self.displacements.max(), self.multipliers.max())) + 1)
-        chosen = by_kind(self.sides, self.others, none, none)
-        return [self._block(a, b, i, j, x) for a, b, i, j in chosen]
+        kinds = by_kind(self.sides, self.others, none, none)
+        return [self._block(a, b, i, j, x) for a, b, i, j in kinds]
 
     def blocks(self, x: Array, old: Array) -> list[ElementBlock]:
         """Elements of the pairs at unknowns x; old: those of the step before."""
-        chosen = by_kind(self.sides, self.others, *self.pairs(x))
-        return [self._block(a, b, i, j, old) for a, b, i, j in chosen]
+        kinds = by_kind(self.sides, self.others, *self.pairs(x))
+        return [self._block(a, b, i, j, old) for a, b, i, j in kinds]
 
     def pairs(self, x: Array) -> tuple[Integers, Integers]:
         """Numbers of sides and of others, both counted through their kinds, that may meet at x."""
         moved = np.where(self.displacements >= 0, x[self.displacements], 0.0)
         if not np.isfinite(moved).all():
             return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-        places = self.points + moved
-        mine = np.concatenate([s.faces[:, :2] for s in self.sides])
-        theirs = np.concatenate([faces[:, :2] for _, faces in self.others])
-        found = facing(_balls(places[mine]), _balls(places[theirs]), limits(self.sides))
-        return apart(mine, theirs, *found, alone=self.alone)
+        points = self.points + moved
+        side_corners = np.concatenate([s.faces[:, :2] for s in self.sides])
+        other_corners = np.concatenate([faces[:, :2] for _, faces in self.others])
+        candidates = facing(
+            _balls(points[side_corners]), _balls(points[other_corners]), limits(self.sides)
+        )
+        return apart(side_corners, other_corners, *candidates, alone=self.alone)
 
     def _block(self, a: int, b: int, one: Integers, other: Integers, old: Array) -> ElementBlock:
         """Elements of sides of kind a with others of kind b."""
         side, (kind, faces) = self.sides[a], self.others[b]
         nodes = np.concatenate([side.faces[one], faces[other]], axis=1)
-        n, width, ends = len(nodes), 2 * nodes.shape[1], side.faces[one][:, :2]
+        n, width, corners = len(nodes), 2 * nodes.shape[1], side.faces[one][:, :2]
         moved = self.displacements[nodes]
-        before = np.where(moved >= 0, old[moved], 0.0).transpose(0, 2, 1).reshape(n, width)
+        previous = np.where(moved >= 0, old[moved], 0.0).transpose(0, 2, 1).reshape(n, width)
         constant = np.tile([self.friction, float(self.ring)], (n, 1))
         limits = np.stack([v[one] for v in (side.rho, side.depth, side.reach)], axis=1)
         data = np.concatenate(
-            [before, limits[:, :1], constant[:, :1], limits[:, 1:], constant[:, 1:]], axis=1
+            [previous, limits[:, :1], constant[:, :1], limits[:, 1:], constant[:, 1:]], axis=1
         )
-        own = self.multipliers[ends].reshape(n, 4)
-        dofs = np.concatenate([moved.reshape(n, width), own], axis=1)
+        multipliers = self.multipliers[corners].reshape(n, 4)
+        dofs = np.concatenate([moved.reshape(n, width), multipliers], axis=1)
         return ElementBlock(
             f"{self.name}: {side.kind} on {kind}",
             self.kernels[side.kind, kind],
@@ -117,9 +119,9 @@ class Contact:
 
 def within(tree: cKDTree, places: Array, radius: Array) -> tuple[Integers, Integers]:
     """Pairs of places (n, dim) and points of a tree that are no further apart than radius, (n,)."""
-    found = tree.query_ball_point(places, radius, return_sorted=True)
-    one = np.repeat(np.arange(len(places)), [len(row) for row in found])
-    return one, np.concatenate([np.empty(0, dtype=np.int64), *found]).astype(np.int64)
+    neighbours = tree.query_ball_point(places, radius, return_sorted=True)
+    one = np.repeat(np.arange(len(places)), [len(row) for row in neighbours])
+    return one, np.concatenate([np.empty(0, dtype=np.int64), *neighbours]).astype(np.int64)
 
 
 Balls: TypeAlias = tuple[Array, Array, Array]
@@ -134,8 +136,8 @@ def facing(mine: Balls, theirs: Balls, limits: tuple[Array, Array]) -> tuple[Int
     one, other = within(
         tree, centre, radius + size.max() + np.maximum(reach, np.minimum(depth, nearest))
     )
-    kept = np.einsum("nc,nc->n", along[one], against[other]) < FACING
-    return one[kept], other[kept]
+    mask = np.einsum("nc,nc->n", along[one], against[other]) < FACING
+    return one[mask], other[mask]
 
 
 def apart(
@@ -145,10 +147,10 @@ def apart(
 
     mine, theirs: corners (n, k) of all faces. one, other: rows of them, (m,).
     """
-    kept = (mine[one][:, :, None] != theirs[other][:, None, :]).all(axis=(1, 2))
+    mask = (mine[one][:, :, None] != theirs[other][:, None, :]).all(axis=(1, 2))
     if alone:
-        kept &= one < other
-    return one[kept], other[kept]
+        mask &= one < other
+    return one[mask], other[mask]
 
 
 def by_kind(
@@ -158,13 +160,17 @@ def by_kind(
 
     one, other: pairs of faces that are counted through all kinds.
     """
-    mine, theirs = _starts([s.faces for s in sides]), _starts([faces for _, faces in others])
+    side_starts, other_starts = (
+        _starts([s.faces for s in sides]),
+        _starts([faces for _, faces in others]),
+    )
     kind, kind_of_other = (
-        np.searchsorted(s, k, side="right") - 1 for s, k in ((mine, one), (theirs, other))
+        np.searchsorted(s, k, side="right") - 1
+        for s, k in ((side_starts, one), (other_starts, other))
     )
     for a, b in product(range(len(sides)), range(len(others))):
-        chosen = (kind == a) & (kind_of_other == b)
-        yield a, b, one[chosen] - mine[a], other[chosen] - theirs[b]
+        mask = (kind == a) & (kind_of_other == b)
+        yield a, b, one[mask] - side_starts[a], other[mask] - other_starts[b]
 
 
 def limits(sides: Sequence[Side]) -> tuple[Array, Array]:
@@ -248,19 +254,19 @@ class TouchingProblem(Problem):
 
     def at(self, x: Array) -> Problem:
         """The problem with the pairs at x, (n,), and no others."""
-        found = [b for contact in self.contacts for b in contact.blocks(x, self.old)]
+        blocks_at_x = [b for contact in self.contacts for b in contact.blocks(x, self.old)]
         last = self.latest[0].assembler if self.latest else None
-        if last is not None and all(_alike(b, last.block(b.name), data=True) for b in found):
+        if last is not None and all(_alike(b, last.block(b.name), data=True) for b in blocks_at_x):
             return self.latest[0]
-        new = {block.name: block for block in found}
+        new = {block.name: block for block in blocks_at_x}
         blocks = tuple(new.get(b.name, b) for b in self.assembler.blocks)
         size = self.assembler.size
         structure = Structure(size, tuple(b.dofs for b in blocks))
-        if last is not None and all(_alike(b, last.block(b.name)) for b in found):
+        if last is not None and all(_alike(b, last.block(b.name)) for b in blocks_at_x):
             structure = last.structure
         assembler = Assembler(size, blocks, structure)
-        given = {f.name: getattr(self, f.name) for f in fields(Problem)}
-        self.latest[:] = [Problem(**{**given, "assembler": assembler})]
+        arguments = {f.name: getattr(self, f.name) for f in fields(Problem)}
+        self.latest[:] = [Problem(**{**arguments, "assembler": assembler})]
         return self.latest[0]
 
     def step_limit(self, x: Array, dx: Array) -> float:

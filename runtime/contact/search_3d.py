@@ -43,28 +43,28 @@ class FaceContact:
         """Its blocks without elements, which keep their places."""
         x = np.zeros(int(max(self.displacements.max(), self.multipliers.max())) + 1)
         none = np.empty(0, dtype=np.int64)
-        chosen, corners = by_kind(self.sides, self.others, none, none), np.empty((0, 3, CORNER))
-        return [self._block(a, b, (i, j, corners), x) for a, b, i, j in chosen]
+        kinds, corners = by_kind(self.sides, self.others, none, none), np.empty((0, 3, CORNER))
+        return [self._block(a, b, (i, j, corners), x) for a, b, i, j in kinds]
 
     def blocks(self, x: Array, old: Array) -> list[ElementBlock]:
         """Elements of the pairs at unknowns x; old: of the step before."""
         moved = np.where(self.displacements >= 0, x[self.displacements], 0.0)
         if not np.isfinite(moved).all():
             return self.empty()
-        places = self.points + moved
-        found = []
-        for a, b, i, j in by_kind(self.sides, self.others, *self._pairs(places)):
+        points = self.points + moved
+        result = []
+        for a, b, i, j in by_kind(self.sides, self.others, *self._pairs(points)):
             side, (label, faces) = self.sides[a], self.others[b]
             cells = CELLS[side.kind], CELLS[label]
-            part = common_part(cells[0], places[side.faces[i]], cells[1], places[faces[j]])
-            found.append(self._block(a, b, (i[part.pairs], j[part.pairs], part.corners), old))
-        return found
+            part = common_part(cells[0], points[side.faces[i]], cells[1], points[faces[j]])
+            result.append(self._block(a, b, (i[part.pairs], j[part.pairs], part.corners), old))
+        return result
 
     def _pairs(self, places: Array) -> tuple[Integers, Integers]:
         """Numbers of sides and of others, both counted through their kinds, that may meet."""
-        mine = [(s.kind, s.faces) for s in self.sides]
-        found = facing(_balls(places, mine), _balls(places, self.others), limits(self.sides))
-        return apart(_corners(mine), _corners(self.others), *found, alone=self.alone)
+        sides = [(s.kind, s.faces) for s in self.sides]
+        candidates = facing(_balls(places, sides), _balls(places, self.others), limits(self.sides))
+        return apart(_corners(sides), _corners(self.others), *candidates, alone=self.alone)
 
     def _block(
         self, a: int, b: int, found: tuple[Integers, Integers, Array], old: Array
@@ -72,21 +72,23 @@ class FaceContact:
         """Elements of triangles of sides of kind a and others of kind b."""
         side, (kind, faces) = self.sides[a], self.others[b]
         one, other, corners = found
-        own = side.faces[one]
-        nodes = np.concatenate([own, faces[other]], axis=1)
+        side_faces = side.faces[one]
+        nodes = np.concatenate([side_faces, faces[other]], axis=1)
         n, width = len(nodes), 3 * nodes.shape[1]
         moved = self.displacements[nodes].reshape(n, width)
-        before = np.where(moved >= 0, old[moved], 0.0)
-        given = [side.rho[one], np.full(n, self.friction), side.depth[one], side.reach[one]]
-        ends = own[:, : CELLS[side.kind].corners]
-        multipliers = self.multipliers[ends].reshape(n, MULTIPLIERS * ends.shape[1])
+        previous = np.where(moved >= 0, old[moved], 0.0)
+        limits = [side.rho[one], np.full(n, self.friction), side.depth[one], side.reach[one]]
+        corners_of_side = side_faces[:, : CELLS[side.kind].corners]
+        multipliers = self.multipliers[corners_of_side].reshape(
+            n, MULTIPLIERS * corners_of_side.shape[1]
+        )
         return ElementBlock(
             f"{self.name}: {side.kind} on {kind}",
             self.kernels[side.kind, kind],
             self.points[nodes].reshape(n, width),
             np.ascontiguousarray(np.concatenate([moved, multipliers], axis=1)),
             np.concatenate(
-                [before, np.stack(given, axis=1), corners.reshape(n, 3 * CORNER)], axis=1
+                [previous, np.stack(limits, axis=1), corners.reshape(n, 3 * CORNER)], axis=1
             ),
             check_orientation=False,
         )
@@ -94,13 +96,13 @@ class FaceContact:
 
 def _balls(places: Array, kinds: Sequence[tuple[str, Integers]]) -> Balls:
     """Centres, radii and normals of the faces of all kinds."""
-    found = []
+    balls = []
     for kind, faces in kinds:
         corners = places[faces[:, : CELLS[kind].corners]]
         centre = corners.mean(axis=1)
         radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-        found.append((centre, radius, mean_normal(CELLS[kind], corners)))
-    centre, radius, normal = (np.concatenate([f[k] for f in found]) for k in (0, 1, 2))
+        balls.append((centre, radius, mean_normal(CELLS[kind], corners)))
+    centre, radius, normal = (np.concatenate([f[k] for f in balls]) for k in (0, 1, 2))
     return centre, radius, normal
 
 

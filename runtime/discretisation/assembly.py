@@ -39,14 +39,14 @@ class Memo:
 
     def without(self, name: str) -> Memo:
         """A copy that knows nothing of one block's tangent."""
-        tangents = {n: known for n, known in self.tangents.items() if n != name}
+        tangents = {n: entry for n, entry in self.tangents.items() if n != name}
         return replace(self, tangents=tangents, crosses=dict(self.crosses))
 
-    def keep_cross(self, key: bytes, places: Integers) -> None:
+    def keep_cross(self, key: bytes, positions: Integers) -> None:
         """Remember the positions of a set of unknowns; the oldest of too many is forgotten."""
         while len(self.crosses) >= _SETS:
             del self.crosses[next(iter(self.crosses))]
-        self.crosses[key] = places
+        self.crosses[key] = positions
 
 
 @dataclass(eq=False)
@@ -255,11 +255,11 @@ class Assembler:
         """
         key = frozenset(names)
         if key not in self.memo.counts:
-            found = np.zeros(self.size, dtype=np.int64)
+            n_elements = np.zeros(self.size, dtype=np.int64)
             for block in self.blocks:
                 if block.name in key:
-                    np.add.at(found, block.dofs.ravel(), 1)
-            self.memo.counts[key] = found
+                    np.add.at(n_elements, block.dofs.ravel(), 1)
+            self.memo.counts[key] = n_elements
         return self.memo.counts[key]
 
     def around(self, values: Array, names: Iterable[str]) -> Array:
@@ -277,12 +277,12 @@ class Assembler:
         array (size,)
             Sums.
         """
-        found, chosen = np.zeros(self.size), frozenset(names)
+        sums_around, active = np.zeros(self.size), frozenset(names)
         for block in self.blocks:
-            if block.name in chosen:
+            if block.name in active:
                 sums = values[block.dofs].sum(axis=1)
-                np.add.at(found, block.dofs, sums[:, None])
-        return found
+                np.add.at(sums_around, block.dofs, sums[:, None])
+        return sums_around
 
     def reach(self) -> Array:
         """Return the largest coordinate of the elements of each unknown.
@@ -321,9 +321,9 @@ class Assembler:
         """
         for block in self.blocks:
             if block.name in parameters:
-                found = not_finite(block, *block.tangent(x, parameters[block.name]))
-                if found:
-                    return found
+                message = not_finite(block, *block.tangent(x, parameters[block.name]))
+                if message:
+                    return message
         return ""
 
     def linearise(
@@ -349,15 +349,15 @@ class Assembler:
         for block, scatter in zip(self.blocks, self.pattern.scatter, strict=True):
             if block.name not in parameters:
                 continue
-            given = parameters[block.name]
+            block_parameters = parameters[block.name]
             if block.constant:
-                self._add_residual(total, block, x, given)
-                places, entries = self._constant(block, scatter, given)
-                np.add.at(data, places, entries)
+                self._add_residual(total, block, x, block_parameters)
+                positions, entries = self._constant(block, scatter, block_parameters)
+                np.add.at(data, positions, entries)
                 continue
-            for piece, places in block.pieces(scatter):
-                local, tangents = piece.tangent(x, given)
-                np.add.at(data, places, tangents.ravel())
+            for piece, positions in block.pieces(scatter):
+                local, tangents = piece.tangent(x, block_parameters)
+                np.add.at(data, positions, tangents.ravel())
                 np.add.at(total, piece.dofs.ravel(), local.ravel())
         return total, self.pattern.matrix(data)
 
@@ -375,28 +375,28 @@ class Assembler:
             Positions.
         """
         key = fixed.tobytes()
-        places = self.memo.crosses.get(key)
-        if places is None:
-            chosen = np.zeros(self.size, dtype=bool)
-            chosen[fixed] = True
-            columns = np.repeat(chosen, np.diff(self.pattern.indptr))
-            places = np.flatnonzero(columns | chosen[self.pattern.indices])
-            self.memo.keep_cross(key, places)
-        return places
+        positions = self.memo.crosses.get(key)
+        if positions is None:
+            is_fixed = np.zeros(self.size, dtype=bool)
+            is_fixed[fixed] = True
+            columns = np.repeat(is_fixed, np.diff(self.pattern.indptr))
+            positions = np.flatnonzero(columns | is_fixed[self.pattern.indices])
+            self.memo.keep_cross(key, positions)
+        return positions
 
-    def _add_residual(self, total: Array, block: ElementBlock, x: Array, given: Array) -> None:
+    def _add_residual(self, total: Array, block: ElementBlock, x: Array, parameters: Array) -> None:
         """Add the residuals of a block to the sum, in place."""
-        np.add.at(total, block.dofs.ravel(), block.residual(x, given).ravel())
+        np.add.at(total, block.dofs.ravel(), block.residual(x, parameters).ravel())
 
     def _constant(
         self, block: ElementBlock, scatter: Integers, parameters: Array
     ) -> tuple[Integers, Array]:
         """Places and values of the entries of a constant tangent."""
-        known = self.memo.tangents.get(block.name)
-        if known is None or not np.array_equal(known[0], parameters):
+        cached = self.memo.tangents.get(block.name)
+        if cached is None or not np.array_equal(cached[0], parameters):
             data = np.zeros(self.pattern.nnz)
             np.add.at(data, scatter, block.tangent(np.zeros(self.size), parameters)[1].ravel())
-            places = np.flatnonzero(data)
-            known = parameters.copy(), places, data[places]
-            self.memo.tangents[block.name] = known
-        return known[1], known[2]
+            positions = np.flatnonzero(data)
+            cached = parameters.copy(), positions, data[positions]
+            self.memo.tangents[block.name] = cached
+        return cached[1], cached[2]

@@ -53,20 +53,20 @@ class Constraints:
         ties += [b.dofs for b in problem.assembler.blocks if isinstance(b.kernel, Tie)]
         a, b, multipliers = np.concatenate(ties).T
         group = tied_groups(a, b, n)
-        held: Flags = np.zeros(int(group.max(initial=-1)) + 1, dtype=bool)
-        held[group[problem.fixed]] = held[group[multipliers]] = True
+        constrained: Flags = np.zeros(int(group.max(initial=-1)) + 1, dtype=bool)
+        constrained[group[problem.fixed]] = constrained[group[multipliers]] = True
         inner = [] if K is None else _internal(problem, K)
         for numbers, _ in inner:
-            held[group[numbers]] = True
-        number = np.cumsum(~held) - 1
-        rows = np.flatnonzero(~held[group])
+            constrained[group[numbers]] = True
+        number = np.cumsum(~constrained) - 1
+        rows = np.flatnonzero(~constrained[group])
         columns = number[group[rows]]
-        found = csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, int((~held).sum())))
+        T = csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, int((~constrained).sum())))
         if inner:
             assert K is not None
-            moved = [-_spread(inverse, numbers, n) @ K @ found for numbers, inverse in inner]
-            found = csr_array(found + sum(moved))
-        return cls(problem, found)
+            moved = [-_spread(inverse, numbers, n) @ K @ T for numbers, inverse in inner]
+            T = csr_array(T + sum(moved))
+        return cls(problem, T)
 
     def gather(self, forces: Array) -> Array:
         """T' f, (m,)."""
@@ -91,12 +91,12 @@ def _internal(problem: Problem, K: csc_array) -> list[tuple[Integers, Array]]:
     """Numbers (n, k) of the internal unknowns of each block with some, and the inverses (n, k, k)
     of their tangents; without blocks where these have none.
     """
-    found = []
+    result = []
     for numbers in _internal_dofs(problem):
         inverse = _inverses(_blocks(K, numbers))
         if np.isfinite(inverse).all():
-            found.append((numbers, inverse))
-    return found
+            result.append((numbers, inverse))
+    return result
 
 
 def _internal_dofs(problem: Problem) -> list[Integers]:
@@ -133,11 +133,11 @@ def internal_negative(problem: Problem, K: csc_array) -> int:
 
 def _condensed(problem: Problem, K: csc_array) -> csc_array:
     """K (n, n) with internal unknowns of elements condensed, whose rows and columns are zero."""
-    kept, n = np.ones(problem.assembler.size), problem.assembler.size
+    mask, n = np.ones(problem.assembler.size), problem.assembler.size
     for numbers, inverse in _internal(problem, K):
         K = csc_array(K - K @ _spread(inverse, numbers, n) @ K)
-        kept[numbers] = 0.0
-    return K if kept.all() else csc_array(K.multiply(kept[:, None]).multiply(kept[None]))
+        mask[numbers] = 0.0
+    return K if mask.all() else csc_array(K.multiply(mask[:, None]).multiply(mask[None]))
 
 
 def concave(
@@ -157,33 +157,35 @@ def concave(
     a part each, and whether something is true on any.
     """
     layout, fixed, K = problem.layout, problem.fixed, _condensed(problem, K)
-    found: Flags = np.zeros(layout.total, dtype=bool)
-    free = ~found
+    is_concave: Flags = np.zeros(layout.total, dtype=bool)
+    free = ~is_concave
     free[fixed] = False
     diagonal = added(K.diagonal())
     moving = np.zeros(layout.total)
     for name in set(DISPLACEMENTS) & set(layout.names):
-        own = diagonal[layout.part(name)]
-        moving[layout.part(name)] = np.divide(1.0, own, out=np.zeros_like(own), where=own > 0.0)
+        entries = diagonal[layout.part(name)]
+        moving[layout.part(name)] = np.divide(
+            1.0, entries, out=np.zeros_like(entries), where=entries > 0.0
+        )
     pivots = added(K.multiply(K) @ moving)
     diagonal = np.where(np.abs(diagonal) > _NOTHING * pivots, diagonal, 0.0)
     inner = {name for block in problem.assembler.blocks for name in block.internal}
     named = [(name, layout.part(name)) for name in layout.names if name not in inner]
     fields = [part for name, part in named if name not in DISPLACEMENTS]
     for part in fields:
-        own, held = diagonal[part], not anywhere(bool(free[part].any()))
-        convex = (own >= 0.0).any() if held else (own[free[part]] > 0.0).any()
-        found[part] = not anywhere(bool(convex))
-    if all(anywhere(bool(found[part].any())) for _, part in named):
+        entries, all_fixed = diagonal[part], not anywhere(bool(free[part].any()))
+        convex = (entries >= 0.0).any() if all_fixed else (entries[free[part]] > 0.0).any()
+        is_concave[part] = not anywhere(bool(convex))
+    if all(anywhere(bool(is_concave[part].any())) for _, part in named):
         for part in fields:
-            found[part] = anywhere(bool((diagonal[part] < 0.0).any()))
-    others = added(abs(K) @ (~found).astype(np.float64))  # a fixed unknown is no other field
-    found[fixed] = False
+            is_concave[part] = anywhere(bool((diagonal[part] < 0.0).any()))
+    others = added(abs(K) @ (~is_concave).astype(np.float64))  # a fixed unknown is no other field
+    is_concave[fixed] = False
     others[_written(problem)] = 1.0
     for part in fields:
         if not anywhere(bool(others[part].any())):
-            found[part] = False
-    return found
+            is_concave[part] = False
+    return is_concave
 
 
 def _written(problem: Problem) -> Integers:
@@ -240,8 +242,8 @@ class LevelConstraints:
     @property
     def matrix(self) -> csr_array:
         """T, (n, n), of zeros and ones; columns of unknowns that are none of z are empty."""
-        own = np.flatnonzero(self.moving)
-        rows, columns = np.append(own, self.behind), np.append(own, self.ahead)
+        masters = np.flatnonzero(self.moving)
+        rows, columns = np.append(masters, self.behind), np.append(masters, self.ahead)
         n = len(self.moving)
         return csr_array(coo_array((np.ones(len(rows)), (rows, columns)), (n, n)))
 
@@ -268,24 +270,26 @@ class Ties:
 
         Raises ProblemError where a tie follows from others.
         """
-        n, found = problem.assembler.size, [np.empty((0, 3), dtype=np.int64)]
-        found += [b.dofs for b in problem.assembler.blocks if isinstance(b.kernel, Tie)]
-        a, b, forces = np.concatenate(found).T
+        n, ties = problem.assembler.size, [np.empty((0, 3), dtype=np.int64)]
+        ties += [b.dofs for b in problem.assembler.blocks if isinstance(b.kernel, Tie)]
+        a, b, forces = np.concatenate(ties).T
         _require_independent(a, b, problem)
         free: Flags = np.ones(n, dtype=bool)
         free[problem.fixed] = free[forces] = False
         k, ones = len(a), np.ones(len(a))
         rows = np.tile(np.arange(k), 2)
         B = csr_array(coo_array((np.append(ones, -ones), (rows, np.append(a, b))), (k, n)))
-        spread = csr_array((ones, (forces, np.arange(k))), shape=(n, k)) @ B
-        own = csr_array(B.multiply(free.astype(np.float64)[None]))
-        normal = choose("auto").factorise(csc_array(own @ own.T)) if k else None
+        coupling = csr_array((ones, (forces, np.arange(k))), shape=(n, k)) @ B
+        free_equations = csr_array(B.multiply(free.astype(np.float64)[None]))
+        normal = (
+            choose("auto").factorise(csc_array(free_equations @ free_equations.T)) if k else None
+        )
         groups = tied_groups(a, b, n)
-        still = np.zeros(n, dtype=bool)
-        still[groups[problem.fixed]] = True
-        free &= ~still[groups]
+        group_fixed = np.zeros(n, dtype=bool)
+        group_fixed[groups[problem.fixed]] = True
+        free &= ~group_fixed[groups]
         follows = tuple(_follow(free[numbers], groups[numbers]) for numbers in levels)
-        return cls(csr_array(spread + spread.T), own, normal, forces, free, follows)
+        return cls(csr_array(coupling + coupling.T), free_equations, normal, forces, free, follows)
 
     def shift(self, r: Array) -> Array:
         """The least x, (n,), of B x = r of the ties."""
@@ -308,11 +312,11 @@ def tied_groups(a: Integers, b: Integers, n: int) -> Integers:
 def _follow(free: Flags, groups: Integers) -> LevelConstraints:
     """The first unknown of each group goes ahead of those that are there."""
     _, first, inverse = np.unique(groups, return_index=True, return_inverse=True)
-    ahead = first[inverse]
-    behind = np.flatnonzero(free & (ahead != np.arange(len(free))))
+    masters = first[inverse]
+    slaves = np.flatnonzero(free & (masters != np.arange(len(free))))
     moving = free.copy()
-    moving[behind] = False
-    return LevelConstraints(moving, behind, ahead[behind])
+    moving[slaves] = False
+    return LevelConstraints(moving, slaves, masters[slaves])
 
 
 def _require_independent(a: Integers, b: Integers, problem: Problem) -> None:
@@ -322,9 +326,9 @@ def _require_independent(a: Integers, b: Integers, problem: Problem) -> None:
     node[problem.fixed] = n
     groups = tied_groups(node[a], node[b], n + 1)
     edges, members = np.bincount(groups[node[a]], minlength=n + 1), np.bincount(groups)
-    wrong = np.flatnonzero(edges[: len(members)] >= members)
-    if len(wrong):
-        first = int(np.flatnonzero((groups[node] == wrong[0])[:n])[0])
+    dependent = np.flatnonzero(edges[: len(members)] >= members)
+    if len(dependent):
+        first = int(np.flatnonzero((groups[node] == dependent[0])[:n])[0])
         raise ProblemError(
             f"tie: {problem.name_of(first)} is tied in a circle, so that one tie follows from the "
             "others: leave one of them out"

@@ -48,27 +48,27 @@ class Averaged:
 
     def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Mean of the residuals (n, ndof)."""
-        found = np.zeros(dofs.shape)
+        forces = np.zeros(dofs.shape)
         for _, weight, at, values in self._points(dofs, given):
-            found += weight * self.kernel.residual(coordinates, at, **values)
-        if (own := self.multipliers).size:
+            forces += weight * self.kernel.residual(coordinates, at, **values)
+        if (columns := self.multipliers).size:
             end = self.kernel.residual(coordinates, dofs, **self._end(dofs, given))
-            found[:, own] = end[:, own]
-        return found
+            forces[:, columns] = end[:, columns]
+        return forces
 
     def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
         """Means of residuals and of their derivatives by the unknowns at the end."""
-        found, slopes = np.zeros(dofs.shape), np.zeros((*dofs.shape, dofs.shape[1]))
+        forces, tangents = np.zeros(dofs.shape), np.zeros((*dofs.shape, dofs.shape[1]))
         for s, weight, at, values in self._points(dofs, given):
             r, K = self.kernel.tangent(coordinates, at, **values)
-            found += weight * r
+            forces += weight * r
             moving = np.full(dofs.shape[1], weight * s)
             moving[self.multipliers] = weight
-            slopes += moving * K
-        if (own := self.multipliers).size:
+            tangents += moving * K
+        if (columns := self.multipliers).size:
             r, K = self.kernel.tangent(coordinates, dofs, **self._end(dofs, given))
-            found[:, own], slopes[:, own] = r[:, own], K[:, own]
-        return found, slopes
+            forces[:, columns], tangents[:, columns] = r[:, columns], K[:, columns]
+        return forces, tangents
 
     def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """None, (n, 0, 0): fields belong to states."""
@@ -76,25 +76,28 @@ class Averaged:
 
     def _end(self, dofs: Array, given: dict[str, Any]) -> dict[str, Any]:
         """Arguments at the end of the step."""
-        before = given["data"][:, : -dofs.shape[1]]
-        return {**given, "data": np.ascontiguousarray(before) if before.shape[1] else None}
+        kernel_data = given["data"][:, : -dofs.shape[1]]
+        return {
+            **given,
+            "data": np.ascontiguousarray(kernel_data) if kernel_data.shape[1] else None,
+        }
 
     def _points(self, dofs: Array, given: dict[str, Any]) -> Any:
         """Place along the step, weight, unknowns and other arguments at each point."""
-        before, old = np.split(given["data"], [-dofs.shape[1]], axis=1)
+        kernel_data, old = np.split(given["data"], [-dofs.shape[1]], axis=1)
         for xi, weight in zip(*roots_legendre(POINTS), strict=True):
             s = 0.5 * (1.0 + xi)
-            data, parameters = before.copy(), given["parameters"].copy()
+            data, parameters = kernel_data.copy(), given["parameters"].copy()
             for number, columns, unknowns in self.timed:
                 # (c / s) u(s) + r' is c u + r for every s
                 data[:, columns] -= parameters[number] * (1.0 / s - 1.0) * old[:, unknowns]
                 parameters[number] /= s
             if self.length is not None:
                 parameters[self.length] *= s
-            known = data if data.shape[1] else None
+            data_or_none = data if data.shape[1] else None
             at = np.ascontiguousarray(old + s * (dofs - old))
             at[:, self.multipliers] = dofs[:, self.multipliers]
-            yield s, 0.5 * weight, at, {**given, "data": known, "parameters": parameters}
+            yield s, 0.5 * weight, at, {**given, "data": data_or_none, "parameters": parameters}
 
 
 def with_old(block: ElementBlock, old: Array) -> ElementBlock:
@@ -108,12 +111,12 @@ def time_derivatives(
     kernel: Any, filled: Sequence[tuple[str, dict[str, int]]]
 ) -> tuple[tuple[int, Integers, Integers], ...]:
     """See `Averaged.timed`: of parameters, with a table from data to unknowns each."""
-    found = []
+    derivatives = []
     for parameter, table in filled:
         if parameter in kernel.parameters:
             columns = [k for k, name in enumerate(kernel.data) if name in table]
             unknowns = [table[kernel.data[k]] for k in columns]
-            found.append(
+            derivatives.append(
                 (kernel.parameters.index(parameter), np.array(columns), np.array(unknowns))
             )
-    return tuple(found)
+    return tuple(derivatives)

@@ -104,8 +104,8 @@ class DofLayout:
         try:
             return self._parts[name]
         except KeyError:
-            known = ", ".join(self.names)
-            raise UnknownNameError(f"no field {name!r}; there are {known}") from None
+            allowed = ", ".join(self.names)
+            raise UnknownNameError(f"no field {name!r}; there are {allowed}") from None
 
     def dofs(self, name: str) -> Integers:
         """Return the numbers of the unknowns of a field.
@@ -136,16 +136,16 @@ class DofLayout:
     @cached_property
     def vectors(self) -> tuple[tuple[str, ...], ...]:
         """Names of the fields, those of the components of a vector together."""
-        found: dict[str, list[str]] = {}
+        components: dict[str, list[str]] = {}
         for name in self.names:
             stem, _, axis = name.rpartition("_")
-            found.setdefault(stem if stem and axis in AXES else name, []).append(name)
-        return tuple(map(tuple, found.values()))
+            components.setdefault(stem if stem and axis in AXES else name, []).append(name)
+        return tuple(map(tuple, components.values()))
 
     @cached_property
     def _parts(self) -> dict[str, slice]:
-        ends = itertools.accumulate(self.counts)
-        named = zip(self.names, self.counts, ends, strict=True)
+        stops = itertools.accumulate(self.counts)
+        named = zip(self.names, self.counts, stops, strict=True)
         return {name: slice(end - count, end) for name, count, end in named}
 
 
@@ -205,8 +205,9 @@ def from_names(unknowns: Sequence[str], nodes: int) -> tuple[Slot, ...]:
             numbers.setdefault(match[1], []).append(int(match[2]))
     nodal = {
         name
-        for name, found in numbers.items()
-        if len(found) <= nodes and sorted(found) == list(range(1, len(found) + 1))
+        for name, node_numbers in numbers.items()
+        if len(node_numbers) <= nodes
+        and sorted(node_numbers) == list(range(1, len(node_numbers) + 1))
     }
     return tuple(
         Slot(m[1], int(m[2]) - 1) if m and m[1] in nodal else Slot(name, None)
@@ -259,15 +260,15 @@ class Numbering:
         fields come first, in this order, but for those that no block has; then each other name as
         a field of its own. Raises ValueError for a field of several names that are not at nodes.
         """
-        there, others = _present(points, blocks), _others(blocks)
-        both = sorted(there.keys() & others.keys())
+        has_unknown, others = _present(points, blocks), _others(blocks)
+        both = sorted(has_unknown.keys() & others.keys())
         if both:
             raise ValueError(
                 f"{', '.join(both)}: an unknown of nodes in one block and of elements in another; "
                 "give one of them another name"
             )
-        counts = {name: int(found.sum()) for name, found in there.items()} | others
-        members = _members(counts, there.keys(), fields or {})
+        counts = {name: int(mask.sum()) for name, mask in has_unknown.items()} | others
+        members = _members(counts, has_unknown.keys(), fields or {})
         layout = DofLayout.of(**{f: sum(counts[n] for n in names) for f, names in members.items()})
         nodal: dict[str, Integers] = {}
         rows: dict[str, Integers] = {}
@@ -276,9 +277,9 @@ class Numbering:
                 rows[names[0]] = layout.dofs(name)
                 continue
             numbers = np.full((points, len(names)), -1)
-            numbers[np.stack([there[n] for n in names], axis=1)] = layout.dofs(name)
+            numbers[np.stack([has_unknown[n] for n in names], axis=1)] = layout.dofs(name)
             nodal |= {n: np.ascontiguousarray(numbers[:, k]) for k, n in enumerate(names)}
-        nodal = {name: nodal[name] for name in there}
+        nodal = {name: nodal[name] for name in has_unknown}
         return cls(layout, nodal, {b.block: _dofs(b, blocks, nodal, rows) for b in blocks})
 
     def at(self, names: Sequence[str], nodes: Integers) -> Integers:
@@ -292,41 +293,41 @@ class Numbering:
 
 
 def _members(
-    known: Collection[str], at_nodes: Collection[str], fields: Mapping[str, Sequence[str]]
+    allowed: Collection[str], at_nodes: Collection[str], fields: Mapping[str, Sequence[str]]
 ) -> dict[str, list[str]]:
     """Fields with the names of their unknowns: those that are given, then each other name."""
-    found = {field: [n for n in names if n in known] for field, names in fields.items()}
-    grouped = {unknown for names in found.values() for unknown in names}
-    for name, names in found.items():
+    members = {field: [n for n in names if n in allowed] for field, names in fields.items()}
+    grouped = {unknown for names in members.values() for unknown in names}
+    for name, names in members.items():
         if len(names) > 1 and not set(names) <= set(at_nodes):
             raise ValueError(f"field {name!r}: {', '.join(names)} are not all at nodes")
-        if name in known and name not in grouped:
+        if name in allowed and name not in grouped:
             raise ValueError(f"field {name!r}: an unknown that is not in it has this name")
-    alone = {name: [name] for name in known if name not in grouped}
-    return {name: names for name, names in (found | alone).items() if names}
+    alone = {name: [name] for name in allowed if name not in grouped}
+    return {name: names for name, names in (members | alone).items() if names}
 
 
 def _present(points: int, blocks: Sequence[Elements]) -> dict[str, Flags]:
     """Unknowns at nodes: name -> (points,) where there is one."""
-    found: dict[str, Flags] = {}
+    masks: dict[str, Flags] = {}
     for block in blocks:
         for slot in block.slots:
             if slot.node is not None:
-                there = found.setdefault(slot.name, np.zeros(points, dtype=bool))
-                there[block.nodes[:, slot.node]] = True
-    return found
+                mask = masks.setdefault(slot.name, np.zeros(points, dtype=bool))
+                mask[block.nodes[:, slot.node]] = True
+    return masks
 
 
 def _others(blocks: Sequence[Elements]) -> dict[str, int]:
     """Numbers of the unknowns of elements, and of those along elements, by name."""
-    own = dict.fromkeys(name for block in blocks for name in block.own)
-    found = {name: _first(name, blocks, None) for name in own}
+    element_names = dict.fromkeys(name for block in blocks for name in block.own)
+    offsets = {name: _first(name, blocks, None) for name in element_names}
     for block in blocks:
-        for name, places in block.along.items():
-            if name in own:
+        for name, points in block.along.items():
+            if name in element_names:
                 raise ValueError(f"{name}: an unknown of elements and a field along them")
-            found[name] = max(found.get(name, 0), int(places.max(initial=-1)) + 1)
-    return found
+            offsets[name] = max(offsets.get(name, 0), int(points.max(initial=-1)) + 1)
+    return offsets
 
 
 def _first(name: str, blocks: Sequence[Elements], until: Elements | None) -> int:
@@ -359,5 +360,5 @@ def _dofs(
         else:
             first = _first(slot.name, blocks, block)
             columns.append(rows[slot.name][first : first + n])
-    columns += [column for name, places in block.along.items() for column in rows[name][places].T]
+    columns += [column for name, points in block.along.items() for column in rows[name][points].T]
     return np.ascontiguousarray(np.stack(columns, axis=1))

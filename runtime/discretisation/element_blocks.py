@@ -182,12 +182,12 @@ class ElementBlock:
         """The task with other unknowns than at its last call; None if more than they differ."""
         if not isinstance(self.kernel, Kernel) or self.point_data is not None:
             return None
-        known = self.calls.get(task)
-        if known is None or known[0] is not parameters:
+        cached = self.calls.get(task)
+        if cached is None or cached[0] is not parameters:
             at_rest = np.zeros(self.dofs.shape)
             call = self.kernel.call(task, self.coordinates, at_rest, **self.given(parameters))
-            known = self.calls[task] = parameters, call.again()
-        return known[1]
+            cached = self.calls[task] = parameters, call.again()
+        return cached[1]
 
     def pieces(self, scatter: Integers) -> Iterator[tuple[ElementBlock, Integers]]:
         """Yield parts of the block whose tangents fit into the cache of a core.
@@ -234,12 +234,12 @@ class ElementBlock:
             The block with these data.
         """
         unknowns, names = (tuple(getattr(self.kernel, n, ())) for n in ("unknowns", "data"))
-        places = {f"{u[:-1]}_old{u[-1]}": k for k, u in enumerate(unknowns)}
-        columns = [k for k, name in enumerate(names) if name in places]
+        columns_of_old = {f"{u[:-1]}_old{u[-1]}": k for k, u in enumerate(unknowns)}
+        columns = [k for k, name in enumerate(names) if name in columns_of_old]
         if not columns or self.data is None:
             return self
         data = self.data.copy()
-        data[:, columns] = x[self.dofs[:, [places[names[k]] for k in columns]]]
+        data[:, columns] = x[self.dofs[:, [columns_of_old[names[k]] for k in columns]]]
         return replace(self, data=data)
 
     def given(self, parameters: Array) -> dict[str, Any]:
@@ -255,8 +255,10 @@ class ElementBlock:
         dict
             Keyword arguments.
         """
-        given = {"data": self.data, "parameters": parameters, "rule": self.rule}
-        return given if self.point_data is None else {**given, "point_data": self.point_data}
+        arguments = {"data": self.data, "parameters": parameters, "rule": self.rule}
+        return (
+            arguments if self.point_data is None else {**arguments, "point_data": self.point_data}
+        )
 
     def fields(self, x: Array, parameters: Array) -> dict[str, Array]:
         """Return the fields at the quadrature points, and internal unknowns of the elements.
@@ -277,12 +279,12 @@ class ElementBlock:
         if not self.kernel.fields:
             values = np.empty((len(self.dofs), len(self._rule.weights) if internal else 0, 0))
         else:
-            given = self.given(parameters)
-            values = self.kernel.fields_at(self.coordinates, x[self.dofs], **given)
-        found = {name: values[:, :, i] for i, name in enumerate(self.kernel.fields)}
+            arguments = self.given(parameters)
+            values = self.kernel.fields_at(self.coordinates, x[self.dofs], **arguments)
+        by_name = {name: values[:, :, i] for i, name in enumerate(self.kernel.fields)}
         for name, numbers in internal.items():
-            found.setdefault(name, np.repeat(x[numbers][:, None], values.shape[1], axis=1))
-        return found
+            by_name.setdefault(name, np.repeat(x[numbers][:, None], values.shape[1], axis=1))
+        return by_name
 
     @property
     def internal(self) -> dict[str, Integers]:

@@ -27,10 +27,10 @@ def amount(value: Amount, places: Array, t: float, factor: float) -> Array:
     """
     if not callable(value):
         return np.full(len(places), factor * float(value))
-    found = np.asarray(value(places, t), dtype=np.float64)
-    if found.shape not in ((), (len(places),)):
-        raise ValueError(f"a function of {len(places)} places gave values of shape {found.shape}")
-    return np.broadcast_to(found, (len(places),)).copy()
+    result = np.asarray(value(places, t), dtype=np.float64)
+    if result.shape not in ((), (len(places),)):
+        raise ValueError(f"a function of {len(places)} places gave values of shape {result.shape}")
+    return np.broadcast_to(result, (len(places),)).copy()
 
 
 def _rule(face: Cell, *, ring: bool) -> tuple[Array, Array]:
@@ -71,12 +71,16 @@ class DeadLoad(_Kernel):
     def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Minus the virtual work of the load, (n, k)."""
         n, nodes = len(coordinates), len(self.face.nodes)
-        places = coordinates.reshape(n, nodes, coordinates.shape[1] // nodes)
+        node_points = coordinates.reshape(n, nodes, coordinates.shape[1] // nodes)
         points, weights = _rule(self.face, ring=self.ring)
         shape = self.face.shape(points)
-        x = np.einsum("qk,nkc->nqc", shape, places)
+        x = np.einsum("qk,nkc->nqc", shape, node_points)
         load = amount(self.value, x.reshape(-1, x.shape[2]), *given["parameters"].tolist())
-        area = measures(self.face, places, points) if self.face.dimension else np.ones(x.shape[:2])
+        area = (
+            measures(self.face, node_points, points)
+            if self.face.dimension
+            else np.ones(x.shape[:2])
+        )
         area = area * 2.0 * np.pi * x[:, :, 1] if self.ring else area
         work = np.einsum("nq,nq,q,qk->nk", load.reshape(x.shape[:2]), area, weights, shape)
         return np.asarray(-work)
@@ -108,14 +112,16 @@ class Pressure(_Kernel):
 
     def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
         """Residual and its exact tangent, which is not symmetric."""
-        r, slopes, load, points = self._evaluate(coordinates, dofs, given)
+        r, gradient, load, points = self._evaluate(coordinates, dofs, given)
         around = self._around(coordinates, dofs, points)
         shape, along = self.face.shape(points), self.face.gradient(points)
-        turn = _turned(slopes)  # (n, q, c, c, d): normal component by slope component and direction
+        turn = _turned(
+            gradient
+        )  # (n, q, c, c, d): normal component by slope component and direction
         K = np.einsum("nq,qk,nqced,qld->nkcle", load * around, shape, turn, along, optimize=True)
         if self.ring:
             wider = 2.0 * np.pi * load
-            K[..., 1] += np.einsum("nq,qk,nqc,ql->nkcl", wider, shape, _normal(slopes), shape)
+            K[..., 1] += np.einsum("nq,qk,nqc,ql->nkcl", wider, shape, _normal(gradient), shape)
         return r, np.ascontiguousarray(K.reshape(*r.shape, r.shape[1]))
 
     def _evaluate(
@@ -129,13 +135,15 @@ class Pressure(_Kernel):
         X, u = coordinates.reshape(shape), dofs.reshape(shape)
         points, weights = _rule(self.face, ring=self.ring)
         values, along = self.face.shape(points), self.face.gradient(points)
-        places = np.einsum("qk,nkc->nqc", values, X)
-        load = amount(self.value, places.reshape(-1, X.shape[2]), *given["parameters"].tolist())
-        slopes = np.einsum("qkd,nkc->nqcd", along, X + u)
-        weighted = load.reshape(places.shape[:2]) * weights
+        load_points = np.einsum("qk,nkc->nqc", values, X)
+        load = amount(
+            self.value, load_points.reshape(-1, X.shape[2]), *given["parameters"].tolist()
+        )
+        gradient = np.einsum("qkd,nkc->nqcd", along, X + u)
+        weighted = load.reshape(load_points.shape[:2]) * weights
         around = self._around(coordinates, dofs, points)
-        r = np.einsum("nq,qk,nqc->nkc", weighted * around, values, _normal(slopes))
-        return r.reshape(dofs.shape), slopes, weighted, points
+        r = np.einsum("nq,qk,nqc->nkc", weighted * around, values, _normal(gradient))
+        return r.reshape(dofs.shape), gradient, weighted, points
 
     def _around(self, coordinates: Array, dofs: Array, points: Array) -> Array:
         """Deformed circumferences (n, q) of rings, else ones."""
@@ -155,15 +163,15 @@ def _normal(slopes: Array) -> Array:
 
 def _turned(slopes: Array) -> Array:
     """Derivatives of the normal by the slopes, (n, q, c, c, d)."""
-    found = np.zeros((*slopes.shape[:2], slopes.shape[2], *slopes.shape[2:]))
+    derivatives = np.zeros((*slopes.shape[:2], slopes.shape[2], *slopes.shape[2:]))
     if slopes.shape[2] == 2:
-        found[..., 0, 1, 0], found[..., 1, 0, 0] = 1.0, -1.0
-        return found
+        derivatives[..., 0, 1, 0], derivatives[..., 1, 0, 0] = 1.0, -1.0
+        return derivatives
     for c in range(3):  # normal = a x b, d/da_c = e_c x b, d/db_c = a x e_c
         e = np.eye(3)[c]
-        found[..., :, c, 0] = np.cross(e, slopes[..., 1])
-        found[..., :, c, 1] = np.cross(slopes[..., 0], e)
-    return found
+        derivatives[..., :, c, 0] = np.cross(e, slopes[..., 1])
+        derivatives[..., :, c, 1] = np.cross(slopes[..., 0], e)
+    return derivatives
 
 
 @dataclass(frozen=True, eq=False)

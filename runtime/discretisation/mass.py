@@ -30,7 +30,7 @@ def mass_matrices(
     outline = geometry or cell
     points, weights = outline.measured_rule(2 * cell.order, ring=ring)
     shape, position = cell.shape(points), outline.shape(points)
-    found = np.empty((len(places), shape.shape[1], shape.shape[1]))
+    matrices = np.empty((len(places), shape.shape[1], shape.shape[1]))
     step = max(_AT_ONCE // shape.size, 1)
     for first in range(0, len(places), step):
         some = slice(first, first + step)
@@ -39,8 +39,8 @@ def mass_matrices(
             mass = mass * measures(outline, places[some], points)
         if ring:
             mass = mass * 2.0 * np.pi * (places[some, :, 1] @ position.T)
-        found[some] = (mass[:, None, :] * shape.T) @ shape
-    return found
+        matrices[some] = (mass[:, None, :] * shape.T) @ shape
+    return matrices
 
 
 def lumped(matrices: Array) -> Array:

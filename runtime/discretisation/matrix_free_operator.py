@@ -57,31 +57,31 @@ class Tangent:
         cls, problem: Problem, levels: Levels, iteration: Iteration, ties: Ties, x: Array
     ) -> Tangent:
         """At x, (n,)."""
-        products, diagonal, rest = [], np.zeros(len(x)), csr_array((len(x), len(x)))
+        products, diagonal, loads_matrix = [], np.zeros(len(x)), csr_array((len(x), len(x)))
         count = levels.steps[0].shape[1]
         lower = csr_array((count, count))
         for block in problem.assembler.blocks:
-            given = problem.parameters.get(block.name)
-            if given is None or not len(block.dofs) or isinstance(block.kernel, Tie):
+            parameters = problem.parameters.get(block.name)
+            if parameters is None or not len(block.dofs) or isinstance(block.kernel, Tie):
                 continue
             if block.name in levels.places:
-                products.append(Product.of(block, x, given, levels.places[block.name]))
-                lower = lower + _projected(block, x, given, levels, ties.free, diagonal)
+                products.append(Product.of(block, x, parameters, levels.places[block.name]))
+                lower = lower + _projected(block, x, parameters, levels, ties.free, diagonal)
             else:
-                tangents = block.tangent(x, given)[1]
-                rest = rest + _matrix(block.dofs, tangents, len(x))
-        diagonal += rest.diagonal()
+                tangents = block.tangent(x, parameters)[1]
+                loads_matrix = loads_matrix + _matrix(block.dofs, tangents, len(x))
+        diagonal += loads_matrix.diagonal()
         order = levels.unknowns[0]
-        if rest.nnz:
-            rest = csr_array(rest)[order][:, order]
+        if loads_matrix.nnz:
+            loads_matrix = csr_array(loads_matrix)[order][:, order]
             P = without(levels.steps[0], ties.free[order])
-            lower = lower + P.T @ rest @ P
+            lower = lower + P.T @ loads_matrix @ P
         T = ties.follows[1].matrix
-        found = csr_array(rest), diagonal, ties, csr_array(T.T @ lower @ T)
-        places = next(iter(levels.places.values()))
-        held = np.flatnonzero(~ties.follows[0].moving)
-        work = places.vector(), places.vector()
-        return cls(problem, levels, iteration, tuple(products), *found, held, work)
+        found = csr_array(loads_matrix), diagonal, ties, csr_array(T.T @ lower @ T)
+        numbering = next(iter(levels.places.values()))
+        constrained = np.flatnonzero(~ties.follows[0].moving)
+        work = numbering.vector(), numbering.vector()
+        return cls(problem, levels, iteration, tuple(products), *found, constrained, work)
 
     def times(self, v: Array) -> Array:
         """K v, prescribed unknowns included."""
@@ -90,31 +90,31 @@ class Tangent:
     def _untied(self, v: Array) -> Array:
         """K v without ties."""
         order, y = self.levels.unknowns[0], np.empty_like(v)
-        given, found = self.work
-        given[: len(v)] = v[order]
-        y[order] = self._product(given, found)
+        source, target = self.work
+        source[: len(v)] = v[order]
+        y[order] = self._product(source, target)
         return y
 
-    def _product(self, given: Array, found: Array) -> Array:
+    def _product(self, source: Array, target: Array) -> Array:
         """K v without ties, node by node, of the first numbers of a vector for products; a part
         of the other one.
         """
         n = self.levels.unknowns[0].size
-        found.fill(0.0)
+        target.fill(0.0)
         for product in self.products:
-            product(given, found)
+            product(source, target)
         if self.rest.nnz:
-            found[:n] += self.rest @ given[:n]
-        return found[:n]
+            target[:n] += self.rest @ source[:n]
+        return target[:n]
 
     def apply(self, v: Array) -> Array:
         """T' K T v node by node, with ones for what does not move by itself."""
-        given, found = self.work
-        x, follow = given[: len(v)], self.ties.follows[0]
+        source, target = self.work
+        x, follow = source[: len(v)], self.ties.follows[0]
         x[:] = v
         x[self.held] = 0.0
         follow.spread(x)
-        y = self._product(given, found).copy()
+        y = self._product(source, target).copy()
         follow.gather(y)
         y[self.held] = v[self.held]
         return y
@@ -124,9 +124,9 @@ class Tangent:
         fixed = self.problem.fixed
         moving = v.copy()
         moving[fixed] = 0.0
-        found = self.times(moving)
-        found[fixed] = v[fixed]
-        return found
+        product = self.times(moving)
+        product[fixed] = v[fixed]
+        return product
 
     def diagonal(self) -> Array:
         """Of K."""
@@ -156,17 +156,17 @@ class Tangent:
 
     def _iterated(self, b: Array) -> Array:
         """z of T' K T z = b, node by node; zero for what does not move by itself."""
-        given, cycle = self.iteration, self._multigrid()
+        settings, cycle = self.iteration, self._multigrid()
         method = conjugate_gradients if self.is_symmetric() else minimal_residuals
-        found = method(self.apply, cycle, b, given.tolerance, given.most)
-        given.counts.append(found.iterations)
+        result = method(self.apply, cycle, b, settings.tolerance, settings.most)
+        settings.counts.append(result.iterations)
         # up to a negative curvature it is a direction of descent, which Newton's method may take
-        if not (found.converged or found.negative) or not np.isfinite(found.x).all():
+        if not (result.converged or result.negative) or not np.isfinite(result.x).all():
             raise SingularMatrix(
-                f"matrix-free: no linear solution after {found.iterations} iterations: leave "
+                f"matrix-free: no linear solution after {result.iterations} iterations: leave "
                 "linear out, or take more steps"
             )
-        return found.x
+        return result.x
 
     def is_symmetric(self) -> bool:
         """True if two random vectors say so."""
@@ -182,19 +182,19 @@ class Tangent:
             raise SingularMatrix("the tangent has entries that are not finite")
         follows[0].gather(diagonal)
         diagonal[self.held] = 1.0
-        found, matrix = list[Level](), self.lower
+        multigrid_levels, matrix = list[Level](), self.lower
         for step, (upper, lower) in zip(levels.steps, pairwise(follows), strict=True):
             P = without(step, upper.moving) @ lower.matrix
-            if not found:
-                found.append(Level.of(self.apply, diagonal, P))
+            if not multigrid_levels:
+                multigrid_levels.append(Level.of(self.apply, diagonal, P))
                 continue
             A = _with_ones(matrix, upper.moving)
-            found.append(Level.of(A.__matmul__, A.diagonal(), P))
+            multigrid_levels.append(Level.of(A.__matmul__, A.diagonal(), P))
             matrix = csr_array(P.T @ matrix @ P)
         moving = follows[-1].moving
         near = np.where(moving[:, None], levels.near, 0.0)
         lowest = coarse_solver(_with_ones(matrix, moving), near, levels.components)
-        return Multigrid(found, lowest)
+        return Multigrid(multigrid_levels, lowest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,21 +212,21 @@ class _Bound:
 
 
 def _projected(
-    block: ElementBlock, x: Array, given: Array, levels: Levels, free: Flags, diagonal: Array
+    block: ElementBlock, x: Array, parameters: Array, levels: Levels, free: Flags, diagonal: Array
 ) -> csr_array:
     """The matrix at the lower order, and the diagonal of K, from the tangents of elements."""
     P, dofs = levels.transfers[block.name].whole(), levels.lower[block.name]
-    found, at = np.empty((len(dofs), P.shape[1], P.shape[1])), 0
+    projected, at = np.empty((len(dofs), P.shape[1], P.shape[1])), 0
     for piece, _ in block.pieces(np.empty(0, dtype=np.int64)):
-        tangents = piece.tangent(x, given)[1]
+        tangents = piece.tangent(x, parameters)[1]
         np.add.at(diagonal, piece.dofs, np.einsum("nii->ni", tangents))
         mask = free[piece.dofs].astype(np.float64)
-        held = P[None] * mask[:, :, None]
-        found[at : at + len(mask)] = np.swapaxes(held, 1, 2) @ (tangents @ held)
+        masked = P[None] * mask[:, :, None]
+        projected[at : at + len(mask)] = np.swapaxes(masked, 1, 2) @ (tangents @ masked)
         at += len(mask)
     mask = free[levels.unknowns[1]][dofs].astype(np.float64)
-    found *= mask[:, :, None] * mask[:, None, :]
-    return _matrix(dofs, found, len(levels.unknowns[1]))
+    projected *= mask[:, :, None] * mask[:, None, :]
+    return _matrix(dofs, projected, len(levels.unknowns[1]))
 
 
 def _matrix(dofs: Integers, tangents: Array, size: int) -> csr_array:
@@ -244,6 +244,6 @@ def without(step: csr_array, moving: Flags) -> csr_array:
 def _with_ones(A: csr_array, free: Flags) -> csr_array:
     """With a typical number on the diagonal of prescribed unknowns."""
     typical = float(np.abs(A.diagonal()).mean()) or 1.0
-    held = np.where(free, 0.0, typical)
+    entries = np.where(free, 0.0, typical)
     n = len(free)
-    return csr_array(A + csr_array((held, (np.arange(n), np.arange(n))), (n, n)))
+    return csr_array(A + csr_array((entries, (np.arange(n), np.arange(n))), (n, n)))

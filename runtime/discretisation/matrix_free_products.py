@@ -53,8 +53,8 @@ def require_product(block: ElementBlock) -> Kernel:
 
 def threads() -> int:
     """Threads that products use: $OMP_NUM_THREADS, or what the process may use."""
-    told = os.environ.get("OMP_NUM_THREADS", "")
-    return int(told) if told.isdigit() and int(told) > 0 else len(os.sched_getaffinity(0))
+    setting = os.environ.get("OMP_NUM_THREADS", "")
+    return int(setting) if setting.isdigit() and int(setting) > 0 else len(os.sched_getaffinity(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,16 +91,18 @@ class Places:
         unknowns = dofs.reshape(-1, dofs.shape[2])[first]
         nodes = local[:, lexicographic(cell)]
         pieces, shared = _divided(nodes, len(unknowns), count)
-        order, (*runs, rest) = _together([*pieces, shared])
+        order, (*runs, shared_run) = _together([*pieces, shared])
         index = nodes[np.abs(order) - (order < 0)]  # -1 - e: element e once more
         index[order < 0] = len(unknowns)
         order = np.where(order < 0, -1 - order, order)
-        own = np.arange(unknowns.size).reshape(unknowns.shape)
-        at = own if numbers is None else numbers[unknowns]
-        size = own.size if numbers is None else len(numbers)
-        places = np.append(at[:, 0], size).astype(np.int32)[index]
-        lanes = np.ascontiguousarray(np.swapaxes(places.reshape(-1, GROUP, index.shape[1]), 1, 2))
-        return cls(order, lanes, unknowns, at, size, (*runs,), rest)
+        new_numbers = np.arange(unknowns.size).reshape(unknowns.shape)
+        at = new_numbers if numbers is None else numbers[unknowns]
+        size = new_numbers.size if numbers is None else len(numbers)
+        gather_index = np.append(at[:, 0], size).astype(np.int32)[index]
+        lanes = np.ascontiguousarray(
+            np.swapaxes(gather_index.reshape(-1, GROUP, index.shape[1]), 1, 2)
+        )
+        return cls(order, lanes, unknowns, at, size, (*runs,), shared_run)
 
     def vector(self) -> Array:
         """Zeros for the unknowns node by node, and for what is read and written behind them."""
@@ -111,18 +113,18 @@ def _divided(nodes: Numbers, size: int, count: int) -> tuple[list[Integers], Int
     """Elements of each thread that share no node with another's, and all others."""
     n = len(nodes)
     owner = np.minimum(np.arange(n) * count // max(n, 1), count - 1)
-    least, most = np.full(size, count), np.full(size, -1)
-    np.minimum.at(least, nodes, owner[:, None])
-    np.maximum.at(most, nodes, owner[:, None])
-    met: Flags = (least != most)[nodes].any(axis=1)
+    lowest, highest = np.full(size, count), np.full(size, -1)
+    np.minimum.at(lowest, nodes, owner[:, None])
+    np.maximum.at(highest, nodes, owner[:, None])
+    met: Flags = (lowest != highest)[nodes].any(axis=1)
     return [np.flatnonzero((owner == k) & ~met) for k in range(count)], np.flatnonzero(met)
 
 
 def _together(pieces: Sequence[Integers]) -> tuple[Integers, list[tuple[int, int]]]:
     """All pieces one after the other in whole groups, and where each begins and ends."""
     filled = [_filled(piece) for piece in pieces]
-    ends = np.cumsum([0, *map(len, filled)]).tolist()
-    return np.concatenate(filled), [*pairwise(ends)]
+    bounds = np.cumsum([0, *map(len, filled)]).tolist()
+    return np.concatenate(filled), [*pairwise(bounds)]
 
 
 def _filled(elements: Integers) -> Integers:
@@ -134,17 +136,17 @@ def _filled(elements: Integers) -> Integers:
 def by_components(kernel: Kernel) -> Integers:
     """Numbers (nodes, components) of the unknowns of an element."""
     names = list(dict.fromkeys(name for name, _ in kernel.places))
-    found = np.full((kernel.nodes, len(names)), -1)
+    numbers = np.full((kernel.nodes, len(names)), -1)
     for k, (name, node) in enumerate(kernel.places):
-        found[node, names.index(name)] = k
-    return found
+        numbers[node, names.index(name)] = k
+    return numbers
 
 
 @cache
 def _lexicographic(kind: str) -> tuple[int, ...]:
     cell = CELLS[kind]
-    places = np.round(cell.nodes, 9)
-    return tuple(int(k) for k in np.lexsort(places.T))
+    rounded = np.round(cell.nodes, 9)
+    return tuple(int(k) for k in np.lexsort(rounded.T))
 
 
 def lexicographic(cell: Cell) -> list[int]:
@@ -171,7 +173,7 @@ class Product:
         kernel = require_product(block)
         points, m = len(kernel.default_rule.weights), len(places.order)
         keep = kernel.library.function(kernel.name, "keep")
-        kept = _aligned(m, points * kernel.kept)
+        cached = _aligned(m, points * kernel.kept)
         nothing = np.empty(0)
         for first in range(0, m, GROUP * _CHUNK):
             part = slice(first, min(first + GROUP * _CHUNK, m))
@@ -179,8 +181,8 @@ class Product:
             data = _data(block, some)
             read = (block.coordinates[some], x[block.dofs[some]], data)
             arrays = (*read, parameters, nothing, nothing, nothing)
-            keep((len(some), points, 0), arrays, kept[part], None)
-        return cls(places, kernel.library.action(kernel.name), kept, parameters)
+            keep((len(some), points, 0), arrays, cached[part], None)
+        return cls(places, kernel.library.action(kernel.name), cached, parameters)
 
     def __post_init__(self) -> None:
         several = len(self.places.runs) > 1
@@ -188,12 +190,12 @@ class Product:
 
     def __call__(self, x: Array, y: Array) -> None:
         """y += K x for vectors as `Places.vector` makes them."""
-        given = self.parameters, self.kept
+        arguments = self.parameters, self.kept
 
         def run(span: tuple[int, int]) -> None:
             first, last = span
             if last > first:
-                self.action(span, *given, self.places.index, x, y)
+                self.action(span, *arguments, self.places.index, x, y)
 
         if self._pool is None:
             run((0, len(self.places.order)))
@@ -203,10 +205,10 @@ class Product:
 
     def add(self, x: Array, y: Array) -> None:
         """y += K x for vectors of the whole system."""
-        places, given, found = self.places, self.places.vector(), self.places.vector()
-        given[places.at] = x[places.unknowns]
-        self(given, found)
-        y[places.unknowns] += found[places.at]
+        places, source, target = self.places, self.places.vector(), self.places.vector()
+        source[places.at] = x[places.unknowns]
+        self(source, target)
+        y[places.unknowns] += target[places.at]
 
 
 def _aligned(rows: int, columns: int) -> Array:
@@ -214,16 +216,16 @@ def _aligned(rows: int, columns: int) -> Array:
 
     Products are 1.4 to 1.7 times faster so: otherwise every vector of lanes lies in two lines.
     """
-    whole = np.empty(rows * columns + _LINE)
-    first = -(whole.ctypes.data // whole.itemsize) % _LINE
-    return whole[first : first + rows * columns].reshape(rows, columns)
+    buffer = np.empty(rows * columns + _LINE)
+    first = -(buffer.ctypes.data // buffer.itemsize) % _LINE
+    return buffer[first : first + rows * columns].reshape(rows, columns)
 
 
 def _data(block: ElementBlock, some: Integers) -> Array:
     """Data of elements, those of their points behind."""
     parts: Sequence[Array] = [
-        given[some].reshape(len(some), -1)
-        for given in (block.data, block.point_data)
-        if given is not None
+        columns[some].reshape(len(some), -1)
+        for columns in (block.data, block.point_data)
+        if columns is not None
     ]
     return np.ascontiguousarray(np.concatenate(parts, axis=1)) if parts else np.empty(0)

@@ -22,13 +22,13 @@ def motions(places: Array, names: Sequence[str]) -> Array:
     (n len(names), k), node by node, of size 1.
     """
     n, dim = places.shape
-    apart = places - places.mean(axis=0)
-    apart /= float(np.abs(apart).max(initial=0.0)) or 1.0
+    offsets = places - places.mean(axis=0)
+    offsets /= float(np.abs(offsets).max(initial=0.0)) or 1.0
     turned = is_vector(names, dim)
     pairs = [(i, j) for i in range(dim) for j in range(i)] if turned else []
     width = len(names)
-    found = np.zeros((n, width, width + len(pairs)))
-    found[:, range(width), range(width)] = 1.0
+    modes = np.zeros((n, width, width + len(pairs)))
+    modes[:, range(width), range(width)] = 1.0
     for k, (i, j) in enumerate(pairs, start=width):
-        found[:, i, k], found[:, j, k] = apart[:, j], -apart[:, i]
-    return found.reshape(n * width, -1)
+        modes[:, i, k], modes[:, j, k] = offsets[:, j], -offsets[:, i]
+    return modes.reshape(n * width, -1)

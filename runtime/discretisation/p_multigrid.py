@@ -50,8 +50,8 @@ class Transfer:
         kernel = require_product(block)
         cell = CELLS[kernel.cell]
         lower = cell_of(cell, order)
-        apart = np.linalg.norm(cell.nodes[:, None] - lower.nodes[None], axis=2)
-        return cls(lower.shape(cell.nodes), apart.argmin(axis=0), by_components(kernel))
+        distances = np.linalg.norm(cell.nodes[:, None] - lower.nodes[None], axis=2)
+        return cls(lower.shape(cell.nodes), distances.argmin(axis=0), by_components(kernel))
 
     def lower_dofs(self, block: ElementBlock) -> Integers:
         """Unknowns (n, lower nodes, components) of the lower order, by their numbers."""
@@ -60,10 +60,10 @@ class Transfer:
     def whole(self) -> Array:
         """Interpolation (unknowns, lower unknowns) of an element, components running first."""
         components = self.columns.shape[1]
-        found = np.zeros((self.columns.size, self.local.shape[1] * components))
+        matrix = np.zeros((self.columns.size, self.local.shape[1] * components))
         for c in range(components):
-            found[self.columns[:, c], c::components] = self.local
-        return found
+            matrix[self.columns[:, c], c::components] = self.local
+        return matrix
 
 
 def interpolation(
@@ -122,27 +122,29 @@ class Levels:
         while orders[-1] > 1:
             orders.append(LOWER[orders[-1]])
         numbers = _node_by_node(nodal, size)
-        whole = _inverse(numbers, size)
-        dofs = [{b.name: whole[b.dofs] for b in pages}]
+        position = _inverse(numbers, size)
+        dofs = [{b.name: position[b.dofs] for b in pages}]
         unknowns = [numbers]
         steps: list[csr_array] = []
         for upper, now in pairwise(orders):
-            own = {b.name: Transfer.of(b, now).lower_dofs(b) for b in pages}
-            first = np.concatenate([d[:, :, 0].ravel() for d in own.values()])
+            lower_dofs = {b.name: Transfer.of(b, now).lower_dofs(b) for b in pages}
+            first = np.concatenate([d[:, :, 0].ravel() for d in lower_dofs.values()])
             at = np.flatnonzero(np.isin(nodal[0], first))
-            found = np.stack([numbers[at] for numbers in nodal], axis=1).ravel()
-            inverse = _inverse(found, size)
-            dofs.append({n: inverse[d.reshape(len(d), -1)] for n, d in own.items()})
+            level_unknowns = np.stack([numbers[at] for numbers in nodal], axis=1).ravel()
+            inverse = _inverse(level_unknowns, size)
+            dofs.append({n: inverse[d.reshape(len(d), -1)] for n, d in lower_dofs.items()})
             pairs = [
                 (dofs[-2][b.name], dofs[-1][b.name], _element(b, upper, now, whole=len(steps) == 0))
                 for b in pages
             ]
-            steps.append(interpolation(pairs, len(unknowns[-1]), len(found)))
-            unknowns.append(found)
-        places = {b.name: Places.of(b, threads, whole) for b in pages}
+            steps.append(interpolation(pairs, len(unknowns[-1]), len(level_unknowns)))
+            unknowns.append(level_unknowns)
+        element_numbering = {b.name: Places.of(b, threads, position) for b in pages}
         transfers = {b.name: Transfer.of(b, orders[1]) for b in pages}
-        near = motions(points[at], names)
-        return cls(places, transfers, dofs[1], (*unknowns,), (*steps,), len(names), near)
+        nullspace = motions(points[at], names)
+        return cls(
+            element_numbering, transfers, dofs[1], (*unknowns,), (*steps,), len(names), nullspace
+        )
 
 
 def _node_by_node(nodal: Sequence[Integers], size: int) -> Integers:
@@ -154,9 +156,9 @@ def _node_by_node(nodal: Sequence[Integers], size: int) -> Integers:
 
 def _inverse(numbers: Integers, size: int) -> Integers:
     """Place of each of `size` unknowns among numbers."""
-    found = np.empty(size, dtype=np.int64)
-    found[numbers] = np.arange(len(numbers))
-    return found
+    positions = np.empty(size, dtype=np.int64)
+    positions[numbers] = np.arange(len(numbers))
+    return positions
 
 
 def _element(block: ElementBlock, upper: int, lower: int, *, whole: bool) -> Array:

@@ -31,9 +31,9 @@ def run_around(flags: Flags, index: int) -> slice:
     if not flags[index]:
         return slice(index, index + 1)
     false = np.flatnonzero(~flags)
-    before, after = false[false < index], false[false > index]
-    first = int(before[-1]) + 1 if len(before) else 0
-    last = int(after[0]) if len(after) else len(flags)
+    false_left, false_right = false[false < index], false[false > index]
+    first = int(false_left[-1]) + 1 if len(false_left) else 0
+    last = int(false_right[0]) if len(false_right) else len(flags)
     return slice(first, last)
 
 

@@ -105,9 +105,9 @@ class Problem:
         if not np.isfinite(self.values).all():
             first = int(fixed[~np.isfinite(self.values)][0])
             raise ProblemError(f"{self.name_of(first)} is prescribed to a value that is not finite")
-        found = contradiction(fixed, self.values)
-        if found:
-            number, one, other = found
+        conflict = contradiction(fixed, self.values)
+        if conflict:
+            number, one, other = conflict
             raise ProblemError(
                 f"{self.name_of(number)} is prescribed twice, to {one:g} and to {other:g}"
             )
@@ -128,8 +128,8 @@ class Problem:
         layout = self.layout
         field_name = next(n for n in layout.names if number < layout.part(n).stop)
         active = [block for block in self.assembler.blocks if block.name in self.parameters]
-        place = unknown_name([*active, *self.assembler.blocks], number)
-        return f"unknown {number} of field {field_name!r}{place}"
+        element = unknown_name([*active, *self.assembler.blocks], number)
+        return f"unknown {number} of field {field_name!r}{element}"
 
     def where_not_finite(self, x: Array) -> str:
         """Return the element whose residual or tangent is not finite, in words.
@@ -335,13 +335,13 @@ class Problem:
         free: Flags = np.ones(len(r), dtype=bool)
         free[self.fixed] = False
         defect = np.where(free, np.maximum(np.abs(r) - noise, 0.0), 0.0)
-        wanted = x.copy()
-        wanted[self.fixed] = self.values
-        off, extent = x - wanted, np.maximum(np.abs(x), np.abs(wanted))
+        target = x.copy()
+        target[self.fixed] = self.values
+        deviation, extent = x - target, np.maximum(np.abs(x), np.abs(target))
         met = ~free | (self.assembler.counts(self.parameters) > 1)
-        balance = Balance(defect, forces, terms, met, off, extent)
-        found = size(balance.squares(self.layout.fields), balance.worst())
-        return max(found, self._by_scales(defect))
+        balance = Balance(defect, forces, terms, met, deviation, extent)
+        norm = size(balance.squares(self.layout.fields), balance.worst())
+        return max(norm, self._by_scales(defect))
 
     def merit(self, x: Array) -> float:
         """Return the norm of the residuals, each field relative to its forces.
@@ -393,9 +393,9 @@ class Problem:
 
     def _by_scales(self, defect: Array) -> float:
         """Largest norm of the residuals of a field over the scale that is given for it."""
-        given = self.scales.items()
-        found = [defect[self.layout.part(name)] / np.asarray(scale) for name, scale in given]
-        return max((float(np.linalg.norm(part)) for part in found), default=0.0)
+        scales = self.scales.items()
+        scaled = [defect[self.layout.part(name)] / np.asarray(scale) for name, scale in scales]
+        return max((float(np.linalg.norm(part)) for part in scaled), default=0.0)
 
     def beyond_rounding(self, r: Array, x: Array, K: csc_array[np.float64]) -> float:
         """Return the norm of a residual less what the last digits of x may cause.
@@ -422,20 +422,20 @@ class Problem:
     def _is_lost(self, x: Array, forces: Array, K: csc_array[np.float64]) -> bool:
         """True if unknowns have grown until rounding is as large as the loads."""
         reach = self.assembler.reach()
-        known = max(float(reach.max()), float(np.abs(self.values).max(initial=0.0)))
+        reference = max(float(reach.max()), float(np.abs(self.values).max(initial=0.0)))
         largest = float(np.abs(x).max(initial=0.0))
-        if not is_far(largest, known):
+        if not is_far(largest, reference):
             return False
         noise = ROUNDING * np.asarray(abs(K) @ (np.abs(x) + reach))
         return hides(float(np.linalg.norm(noise)), float(np.linalg.norm(forces)))
 
     def _require_determined(self) -> None:
-        loose = np.setdiff1d(self.assembler.loose(self.parameters), self.fixed)
-        if len(loose):
-            others = f" (and {len(loose) - 1} more)" if len(loose) > 1 else ""
+        undetermined = np.setdiff1d(self.assembler.loose(self.parameters), self.fixed)
+        if len(undetermined):
+            others = f" (and {len(undetermined) - 1} more)" if len(undetermined) > 1 else ""
             raise ProblemError(
-                f"{self.name_of(int(loose[0]))}{others} occurs in no block that is switched on: "
-                "prescribe it, or give its block parameters"
+                f"{self.name_of(int(undetermined[0]))}{others} occurs in no block that is switched "
+                "on: prescribe it, or give its block parameters"
             )
 
     def step_limit(self, x: Array, dx: Array) -> float:

@@ -78,23 +78,23 @@ def require_sound_elements(block: ElementBlock) -> None:
             f"of {n}"
         )
     for what, numbers in (("coordinates", block.coordinates), ("data", block.data)):
-        wrong = ~np.isfinite(np.asarray(0.0 if numbers is None else numbers, dtype=np.float64))
-        if wrong.any():
-            row = int(np.nonzero(wrong)[0][0])
+        invalid = ~np.isfinite(np.asarray(0.0 if numbers is None else numbers, dtype=np.float64))
+        if invalid.any():
+            row = int(np.nonzero(invalid)[0][0])
             raise ProblemError(f"{element_name(block, row)}: its {what} are not finite")
     cell = _cell(block)
     if cell is None or not block.check_orientation:
         return
-    places = np.asarray(block.coordinates, dtype=np.float64)
-    places = places.reshape(len(places), len(cell.nodes), cell.dimension)
-    smallest = jacobians(cell, places, cell.rule(2 * cell.order)[0]).min(axis=1)
-    wrong = smallest <= 0.0
-    if wrong.any():
+    points = np.asarray(block.coordinates, dtype=np.float64)
+    points = points.reshape(len(points), len(cell.nodes), cell.dimension)
+    smallest = jacobians(cell, points, cell.rule(2 * cell.order)[0]).min(axis=1)
+    invalid = smallest <= 0.0
+    if invalid.any():
         row = int(smallest.argmin())
         raise ProblemError(
             f"{element_name(block, row)} is inside out or flat (det J = {smallest[row]:.3g}), as "
-            f"are {int(wrong.sum())} of {len(wrong)}: number its nodes in the order of VTK, in the "
-            "plane counterclockwise (check_orientation=False for a page with another order)"
+            f"are {int(invalid.sum())} of {len(invalid)}: number its nodes in the order of VTK, in "
+            "the plane counterclockwise (check_orientation=False for a page with another order)"
         )
 
 
@@ -112,8 +112,8 @@ def _cell(block: ElementBlock) -> Cell | None:
 
 def element_name(block: ElementBlock, row: int) -> str:
     """An element for a message: its number, its block, and where it is if that is known."""
-    places = _places(block, row)
-    where = "" if places is None else f" at {_shown(places.mean(axis=0))}"
+    points = _places(block, row)
+    where = "" if points is None else f" at {_shown(points.mean(axis=0))}"
     return f"element {row} of block {block.name!r}{where}"
 
 
@@ -134,8 +134,8 @@ def _places(block: ElementBlock, row: int) -> Array | None:
     dimension = len(getattr(block.kernel, "coordinates", ()))
     if not dimension:
         return None
-    places: Array = np.asarray(block.coordinates[row], dtype=np.float64).reshape(-1, dimension)
-    return places
+    points: Array = np.asarray(block.coordinates[row], dtype=np.float64).reshape(-1, dimension)
+    return points
 
 
 def _shown(place: Array) -> str:
@@ -144,16 +144,16 @@ def _shown(place: Array) -> str:
 
 def not_finite(block: ElementBlock, *results: Array) -> str:
     """The first element of a block with a result, (n, ...), that is not finite; empty if none."""
-    wrong = rows_not_finite(*results)
-    if not len(wrong):
+    invalid = rows_not_finite(*results)
+    if not len(invalid):
         return ""
-    more = f" and {len(wrong) - 1} more" if len(wrong) > 1 else ""
-    return element_name(block, int(wrong[0])) + more
+    more = f" and {len(invalid) - 1} more" if len(invalid) > 1 else ""
+    return element_name(block, int(invalid[0])) + more
 
 
 def rows_not_finite(*results: Array) -> Integers:
     """Numbers of the elements that have a result, (n, ...), that is not finite."""
-    wrong: Flags = np.zeros(len(results[0]), dtype=bool)
+    invalid: Flags = np.zeros(len(results[0]), dtype=bool)
     for result in results:
-        wrong |= ~np.isfinite(result).all(axis=tuple(range(1, result.ndim)))
-    return np.flatnonzero(wrong)
+        invalid |= ~np.isfinite(result).all(axis=tuple(range(1, result.ndim)))
+    return np.flatnonzero(invalid)

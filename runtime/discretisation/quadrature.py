@@ -82,10 +82,10 @@ def facet_rule(m_p: int) -> Rule:
     """
     if m_p < 1:
         raise ValueError(f"facet_rule: pressure order {m_p} is not allowed, it is at least 1")
-    ends = lagrange(pressure_nodes(m_p), np.array([1.0, -1.0]))
+    end_values = lagrange(pressure_nodes(m_p), np.array([1.0, -1.0]))
     basis = np.zeros((1, 2 * (m_p + 1), 4))
-    basis[0, : m_p + 1, :2] = ends[0]
-    basis[0, m_p + 1 :, 2:] = ends[1]
+    basis[0, : m_p + 1, :2] = end_values[0]
+    basis[0, m_p + 1 :, 2:] = end_values[1]
     return Rule(np.empty((1, 0)), np.ones(1), basis)
 
 
@@ -142,10 +142,10 @@ def _hats(m_p: int) -> Array:
     """Piecewise linear shape functions at the points of `subcells`: (points, m_p + 1, 2)."""
     rule, cell = subcells(m_p)
     nodes, xi = pressure_nodes(m_p), rule.points[:, 0]
-    width, here = np.diff(nodes)[cell], np.arange(len(cell))
+    width, rows = np.diff(nodes)[cell], np.arange(len(cell))
     basis = np.zeros((len(cell), m_p + 1, 2))
-    basis[here, cell] = np.stack([(nodes[cell + 1] - xi) / width, -1.0 / width], axis=1)
-    basis[here, cell + 1] = np.stack([(xi - nodes[cell]) / width, 1.0 / width], axis=1)
+    basis[rows, cell] = np.stack([(nodes[cell + 1] - xi) / width, -1.0 / width], axis=1)
+    basis[rows, cell + 1] = np.stack([(xi - nodes[cell]) / width, 1.0 / width], axis=1)
     return basis
 
 
@@ -158,12 +158,12 @@ def rupture_rule(m_p: int, *, polynomial: bool = True) -> Rule:
     subcell, of v at the lower end of the subcell, and of v at its upper end.
     """
     rule, cell = subcells(m_p)
-    nodes, n, here = pressure_nodes(m_p), m_p + 1, np.arange(len(cell))
+    nodes, n, rows = pressure_nodes(m_p), m_p + 1, np.arange(len(cell))
     basis, hats = np.zeros((len(cell), 2 * n, 8)), _hats(m_p)
     basis[:, :n, :2] = lagrange(nodes, rule.points[:, 0]) if polynomial else hats
     basis[:, :n, 2:4] = hats
-    basis[here, n + cell, 4] = 1.0
-    basis[here, n + cell + 1, 6] = 1.0
+    basis[rows, n + cell, 4] = 1.0
+    basis[rows, n + cell + 1, 6] = 1.0
     points = np.stack([rule.points[:, 0], nodes[cell], nodes[cell + 1]], axis=1)
     return Rule(points, rule.weights, basis)
 

@@ -49,8 +49,10 @@ class Balance:
 
     def worst(self) -> float:
         """Largest residual of one equation relative to what cancels in it."""
-        wrong = np.flatnonzero(self.defect)
-        return float(np.max(self.defect[wrong] / (self.forces + self.terms)[wrong], initial=0.0))
+        nonzero = np.flatnonzero(self.defect)
+        return float(
+            np.max(self.defect[nonzero] / (self.forces + self.terms)[nonzero], initial=0.0)
+        )
 
     def squares(self, fields: Sequence[Integers]) -> Array:
         """Sums of squares over the unknowns of each field, (fields, 6), for `size`."""
@@ -67,11 +69,11 @@ class Balance:
 
 def size(squares: Array, worst: float) -> float:
     """The number, from the sums of squares of all fields and the worst equation."""
-    found = [worst]
-    for defect, forces, every, terms, off, extent in np.sqrt(squares).tolist():
+    ratios = [worst]
+    for defect, forces, every, terms, deviation, extent in np.sqrt(squares).tolist():
         reference = max(forces, _LEAST * terms) if forces else every
-        found += [min(_ratio(defect, reference), 1.0), _ratio(off, extent)]
-    return float(max(found))
+        ratios += [min(_ratio(defect, reference), 1.0), _ratio(deviation, extent)]
+    return float(max(ratios))
 
 
 def is_far(largest: float, known: float) -> bool:

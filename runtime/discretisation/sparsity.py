@@ -81,8 +81,8 @@ def build_pattern(size: int, dof_maps: Sequence[Integers]) -> Pattern:
     where = np.empty(len(rows), dtype=np.int64)
     where[order] = count - 1
     scatter: list[Integers] = []
-    for part, own in zip(parts, _split(where, [part.count for part in parts]), strict=True):
-        scatter.append(part.positions(own, scatter[1:]))
+    for part, entries in zip(parts, _split(where, [part.count for part in parts]), strict=True):
+        scatter.append(part.positions(entries, scatter[1:]))
     indptr = np.concatenate([[0], count])[starts].astype(np.int32)
     return Pattern(size, indptr, rows[fresh], scatter[0], tuple(scatter[1:]))
 
@@ -125,11 +125,11 @@ class _NewEntries:
         if not self.shared:
             return own
         n, k = self.dofs.shape
-        known = earlier[self.source]
+        previous = earlier[self.source]
         if k == self.shared:
-            return known
+            return previous
         result = np.empty((n, k, k), dtype=np.int64)
-        result[:, : self.shared, : self.shared] = known.reshape(n, self.shared, self.shared)
+        result[:, : self.shared, : self.shared] = previous.reshape(n, self.shared, self.shared)
         rows, columns = self.local
         result[:, rows, columns] = own.reshape(n, -1)
         return result.ravel()
@@ -151,5 +151,5 @@ def _sorted_entries(size: int, parts: Sequence[_NewEntries]) -> tuple[Small, Sma
 
 
 def _split(values: Integers, counts: Sequence[int]) -> list[Integers]:
-    ends = np.cumsum([0, *counts])
-    return [values[first:last] for first, last in pairwise(ends)]
+    bounds = np.cumsum([0, *counts])
+    return [values[first:last] for first, last in pairwise(bounds)]

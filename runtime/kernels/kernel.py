@@ -321,13 +321,13 @@ def _place(library: Library) -> Path | None:
 
 def _reloaded(name: str, directory: Path | None, signature: str) -> Kernel:
     """The kernel of that name and signature.  Raises `KernelError` where it is not there."""
-    place = GENERATED if directory is None else directory
+    folder = GENERATED if directory is None else directory
     remedy = "run the script that made it again on this machine"
-    if not (place / "manifest.json").exists():
-        raise MissingKernelsError(f"the kernel {name} is not in {place}: {remedy}")
-    kernel = load_kernel(name, place)
+    if not (folder / "manifest.json").exists():
+        raise MissingKernelsError(f"the kernel {name} is not in {folder}: {remedy}")
+    kernel = load_kernel(name, folder)
     if kernel.signature != signature:
-        raise StaleKernelsError(f"the kernel {name} in {place} is another one now: {remedy}")
+        raise StaleKernelsError(f"the kernel {name} in {folder} is another one now: {remedy}")
     return kernel
 
 
@@ -370,11 +370,11 @@ def kernel_in(directory: Path, name: str | None = None, cell: str | None = None)
     if name is None and len(entries) > 1 and len(stands) != 1:
         raise MissingKernelsError(f"{directory.name} holds {', '.join(entries)}: name one of them")
     if name is None:
-        chosen = stands[0] if len(stands) == 1 else next(iter(entries))
+        selected = stands[0] if len(stands) == 1 else next(iter(entries))
     else:
         named = [n for n in stands if n in (f"{name}_{cell}", f"{name}_{cell}_axisymmetric")]
-        chosen = name if name in entries or not named else named[0]
-    kernel = load_kernel(chosen, directory)
+        selected = name if name in entries or not named else named[0]
+    kernel = load_kernel(selected, directory)
     if not kernel.library.current:
         raise StaleKernelsError(
             f"{directory.name}/ has changed since it was loaded: start Python anew, or load the "

@@ -197,10 +197,12 @@ class Call:
             values = parameters[[kernel.parameters.index(name)]]
         else:
             values = data[:, kernel.data.index(name)]
-        wrong = ~RELATIONS[relation](values, bound)
-        if wrong.any():
-            given, allowed = f"{values[wrong][0]:g}", f"{relation} {bound:g}"
-            raise ArgumentError(f"{kernel.name}: {name} = {given}, must be {allowed} ({where})")
+        invalid = ~RELATIONS[relation](values, bound)
+        if invalid.any():
+            value_text, allowed = f"{values[invalid][0]:g}", f"{relation} {bound:g}"
+            raise ArgumentError(
+                f"{kernel.name}: {name} = {value_text}, must be {allowed} ({where})"
+            )
 
     def _modes(self) -> int:
         if self.kernel.interpolated is None:
@@ -230,12 +232,12 @@ class Call:
     def _array(self, what: str, value: Any, shape: tuple[int, ...]) -> Array:
         if isinstance(value, np.ma.MaskedArray):
             raise ArgumentError(f"{self.kernel.name}: {what} is a masked array: fill it first")
-        given = np.asarray(value)
-        if given.dtype.kind not in "fiu":
+        converted = np.asarray(value)
+        if converted.dtype.kind not in "fiu":
             raise ArgumentError(
-                f"{self.kernel.name}: {what} holds {given.dtype}, must be real numbers"
+                f"{self.kernel.name}: {what} holds {converted.dtype}, must be real numbers"
             )
-        array = np.ascontiguousarray(given, dtype=np.float64)
+        array = np.ascontiguousarray(converted, dtype=np.float64)
         if array.shape != shape:
             raise ArgumentError(
                 f"{self.kernel.name}: {what} has shape {array.shape}, must be {shape}"

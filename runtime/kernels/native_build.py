@@ -40,8 +40,11 @@ def tuned() -> Path:
         raise NotTunedError(f"SOFTEHL_KERNELS is {wish!r}, must be 'tuned' or 'plain'")
     if getattr(sys, "frozen", False) or not sys.executable:
         raise NotTunedError("this is no ordinary Python, which could build them", expected=True)
-    places = [str(_PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
-    paths = {"PYTHONPATH": os.pathsep.join(places), "PYTHONIOENCODING": "utf-8:surrogateescape"}
+    paths_to_packages = [str(_PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
+    paths = {
+        "PYTHONPATH": os.pathsep.join(paths_to_packages),
+        "PYTHONIOENCODING": "utf-8:surrogateescape",
+    }
     try:
         with subprocess.Popen(
             [sys.executable, *_BUILD],
@@ -57,9 +60,9 @@ def tuned() -> Path:
         raise NotTunedError(f"no process to build them can be started ({error})") from None
     if process.returncode == 0 and out.strip():
         return Path(out.splitlines()[-1])
-    words = err.strip().splitlines() or [f"exit code {process.returncode}"]
-    said = next((w for w in words if w.startswith("softehl: ")), words[-1])
-    raise NotTunedError(said.removeprefix("softehl: "), process.returncode == _NO_COMPILER)
+    lines = err.strip().splitlines() or [f"exit code {process.returncode}"]
+    message = next((w for w in lines if w.startswith("softehl: ")), lines[-1])
+    raise NotTunedError(message.removeprefix("softehl: "), process.returncode == _NO_COMPILER)
 
 
 def _awaited(process: subprocess.Popen[str]) -> tuple[str, str]:

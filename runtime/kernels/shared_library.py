@@ -102,11 +102,13 @@ class Library:
         a function of these, of the values and of the tangent that it writes.
         """
         function = self._plain(kernel, task)
-        before, *after = (_pointer(array) for k, array in enumerate(read) if k != 1)
+        first_pointer, *other_pointers = (_pointer(array) for k, array in enumerate(read) if k != 1)
 
         def call(dofs: Array, values: Array, tangent: Array | None) -> None:
             written = _ffi.NULL if tangent is None else _pointer(tangent)
-            function(*counts, before, _pointer(dofs), *after, _pointer(values), written)
+            function(
+                *counts, first_pointer, _pointer(dofs), *other_pointers, _pointer(values), written
+            )
 
         return call
 
@@ -119,8 +121,8 @@ class Library:
         def call(
             span: tuple[int, int], parameters: Array, kept: Array, index: Any, x: Array, y: Array
         ) -> None:
-            given = _pointer(parameters), _pointer(kept), _ffi.from_buffer(_INTS, index)
-            function(*span, *given, _pointer(x), _pointer(y))
+            pointers = _pointer(parameters), _pointer(kept), _ffi.from_buffer(_INTS, index)
+            function(*span, *pointers, _pointer(x), _pointer(y))
 
         return call
 
@@ -211,8 +213,8 @@ def _opened(path: Path, directory: Path, remedy: str = "") -> Library:
 def _whole(path: Path) -> bool:
     """True if the file beside a library has its SHA-256."""
     try:
-        told = path.with_name(DIGEST).read_text(encoding="ascii").split()
-        return told[:1] == [hashlib.sha256(path.read_bytes()).hexdigest()]
+        digest = path.with_name(DIGEST).read_text(encoding="ascii").split()
+        return digest[:1] == [hashlib.sha256(path.read_bytes()).hexdigest()]
     except (OSError, UnicodeDecodeError):
         return False
 

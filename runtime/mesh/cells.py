@@ -96,8 +96,8 @@ class Cell:
     @cached_property
     def line(self) -> Array:
         """Nodes of the line that a product of lines is made of: ends first, then rising."""
-        found = np.unique(self.nodes[:, 0])
-        return np.concatenate([found[[0, -1]], found[1:-1]])
+        coordinates = np.unique(self.nodes[:, 0])
+        return np.concatenate([coordinates[[0, -1]], coordinates[1:-1]])
 
     @cached_property
     def lines(self) -> Integers:
@@ -113,23 +113,23 @@ class Cell:
 
     def _products(self, at: Array, by: int | None) -> Array:
         """Products (q, k) of Lagrange's polynomials; along `by` their derivatives."""
-        found = np.ones((len(at), len(self.nodes)))
+        products = np.ones((len(at), len(self.nodes)))
         for d in range(self.dimension):
             values = lagrange(self.line, at[:, d])[int(d == by)]
-            found *= values[:, self.lines[:, d]]
-        return found
+            products *= values[:, self.lines[:, d]]
+        return products
 
     @cached_property
     def side_nodes(self) -> tuple[tuple[Cell, tuple[int, ...]], ...]:
         """Kind and local nodes of each face, in the node order of that kind."""
-        found = []
+        sides = []
         for corners in self.sides:
             kind = next(CELLS[f] for f in self.faces if CELLS[f].corners == len(corners))
             flat = CELLS[_LINEAR[len(corners), kind.dimension]]
-            places = flat.shape(kind.nodes) @ self.nodes[list(corners)]
-            distance = np.linalg.norm(self.nodes[None] - places[:, None], axis=2)
-            found.append((kind, tuple(int(k) for k in distance.argmin(axis=1))))
-        return tuple(found)
+            points = flat.shape(kind.nodes) @ self.nodes[list(corners)]
+            distance = np.linalg.norm(self.nodes[None] - points[:, None], axis=2)
+            sides.append((kind, tuple(int(k) for k in distance.argmin(axis=1))))
+        return tuple(sides)
 
     @cached_property
     def mirrored(self) -> tuple[int, ...]:
@@ -165,12 +165,12 @@ class Cell:
 
 def lagrange(nodes: Array, x: Array) -> tuple[Array, Array]:
     """Lagrange's polynomials of nodes (k,) and their derivatives at x (q,): both (q, k)."""
-    values, slopes = np.ones((len(x), len(nodes))), np.zeros((len(x), len(nodes)))
+    values, derivatives = np.ones((len(x), len(nodes))), np.zeros((len(x), len(nodes)))
     for a, node in enumerate(nodes):
         for b in np.delete(nodes, a):
-            slopes[:, a] = (slopes[:, a] * (x - b) + values[:, a]) / (node - b)
+            derivatives[:, a] = (derivatives[:, a] * (x - b) + values[:, a]) / (node - b)
             values[:, a] *= (x - b) / (node - b)
-    return values, slopes
+    return values, derivatives
 
 
 def lobatto(order: int) -> Array:
@@ -220,17 +220,19 @@ def _means(corners: Sequence[tuple[int, ...]], groups: Sequence[tuple[int, ...]]
 
 def _between(corners: Sequence[tuple[int, ...]], groups: Groups, order: int) -> Array:
     """The corners, and the nodes inside edges, faces and cell, x running first."""
-    inner, found = lobatto(order)[1:-1], [np.array(corners, dtype=np.float64)]
+    inner, nodes = lobatto(order)[1:-1], [np.array(corners, dtype=np.float64)]
     for group in groups:
-        ends = [sorted({corners[k][d] for k in group}) for d in range(len(corners[0]))]
-        lines = [inner if len(some) > 1 else np.array(some, dtype=np.float64) for some in ends]
-        found.append(np.array([place[::-1] for place in product(*reversed(lines))]))
-    return np.vstack(found)
+        end_values = [sorted({corners[k][d] for k in group}) for d in range(len(corners[0]))]
+        lines = [
+            inner if len(some) > 1 else np.array(some, dtype=np.float64) for some in end_values
+        ]
+        nodes.append(np.array([point[::-1] for point in product(*reversed(lines))]))
+    return np.vstack(nodes)
 
 
 def _high(shape: str, corners: Groups, sides: Groups, groups: Groups) -> list[Cell]:
     """Products of lines of order 3 to 6."""
-    found, dimension = [], len(corners[0])
+    kinds, dimension = [], len(corners[0])
     file = {"line": "line", "quad": "quad", "hex": "hexahedron"}[shape]
     face = {"line": "", "quad": "line", "hex": "quad"}[shape]
     for order in range(3, HIGHEST + 1):
@@ -238,8 +240,8 @@ def _high(shape: str, corners: Groups, sides: Groups, groups: Groups) -> list[Ce
         faces = f"{face}{(order + 1) ** (dimension - 1)}" if face else "point1"
         nodes = _between(corners, groups, order)
         name = f"{shape}{count}"
-        found.append(Cell(name, f"{file}{count}", nodes, (), len(corners), sides, (faces,)))
-    return found
+        kinds.append(Cell(name, f"{file}{count}", nodes, (), len(corners), sides, (faces,)))
+    return kinds
 
 
 def _powers(dimension: int, largest: int, total: int, squares: int) -> tuple[tuple[int, ...], ...]:
@@ -260,7 +262,7 @@ def _cells() -> dict[str, Cell]:
     quad9_groups: Groups = (*_SQUARE_SIDES, tuple(range(4)))
     hex27_groups: Groups = (*_CUBE_EDGES, *_CUBE_FACES, tuple(range(8)))
     wedge = tuple((*a, b) for b in (0, 1) for a in _powers(2, 1, 1, 0))
-    found = [
+    kinds = [
         Cell("point1", "vertex", np.zeros((1, 0)), ((),), 1),
         *_family(
             *(_ENDS, _LINE_SIDES),
@@ -304,7 +306,7 @@ def _cells() -> dict[str, Cell]:
         *_high("hex", _CUBE, _CUBE_SIDES, hex27_groups),
         *_family(_WEDGE, _WEDGE_SIDES, [("wedge6", "wedge", (), wedge, ("tri3", "quad4"))]),
     ]
-    return {cell.name: cell for cell in found}
+    return {cell.name: cell for cell in kinds}
 
 
 HIGHEST = 6
@@ -329,15 +331,15 @@ def jacobians(cell: Cell, places: Array, at: Array) -> Array:
     """
     if not cell.dimension:
         return np.ones((len(places), len(at)))
-    slopes = np.tensordot(places, cell.gradient(at), axes=(1, 1)).transpose(0, 2, 1, 3)
+    gradient = np.tensordot(places, cell.gradient(at), axes=(1, 1)).transpose(0, 2, 1, 3)
     if cell.dimension == 2:
-        (a, b), (c, d) = np.moveaxis(slopes, (2, 3), (0, 1))
+        (a, b), (c, d) = np.moveaxis(gradient, (2, 3), (0, 1))
         return np.asarray(a * d - b * c)
-    return np.asarray(np.linalg.det(slopes))
+    return np.asarray(np.linalg.det(gradient))
 
 
 def measures(cell: Cell, places: Array, at: Array) -> Array:
     """Lengths or areas (n, q) per parent unit of faces with nodes at `places` (n, k, dim)."""
-    slopes = np.einsum("qkd,nkc->nqcd", cell.gradient(at), places)
-    metric = np.einsum("nqci,nqcj->nqij", slopes, slopes)
+    gradient = np.einsum("qkd,nkc->nqcd", cell.gradient(at), places)
+    metric = np.einsum("nqci,nqcj->nqij", gradient, gradient)
     return np.asarray(np.sqrt(np.linalg.det(metric)))

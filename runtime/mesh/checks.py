@@ -18,15 +18,15 @@ def check(mesh: Mesh) -> None:
         for kind, faces in side.items():
             _require_once(mesh, f"side {name!r}: ", kind, faces)
     for name, group in mesh.groups.items():
-        for kind, chosen in group.items():
+        for kind, numbers in group.items():
             count = len(mesh.cells.get(kind, ()))
-            if (len(chosen) and chosen.dtype.kind not in "iu") or not (
-                (chosen >= 0) & (chosen < count)
+            if (len(numbers) and numbers.dtype.kind not in "iu") or not (
+                (numbers >= 0) & (numbers < count)
             ).all():
                 raise MeshError(
                     f"group {name!r}: whole numbers below {count}, of {kind}, are needed"
                 )
-            if len(np.unique(chosen)) < len(chosen):
+            if len(np.unique(numbers)) < len(numbers):
                 raise MeshError(f"group {name!r}: the number of a {kind} stands twice")
     for kind, nodes in mesh.cells.items():
         _require_upright(mesh, kind, nodes)
@@ -48,13 +48,13 @@ def _require_upright(mesh: Mesh, kind: str, nodes: Integers) -> None:
     cell = CELLS[kind]
     if cell.dimension != mesh.dimension or not len(nodes):
         return
-    places = mesh.points[nodes]
-    smallest = jacobians(cell, places, cell.rule(2 * cell.order)[0]).min(axis=1)
+    points = mesh.points[nodes]
+    smallest = jacobians(cell, points, cell.rule(2 * cell.order)[0]).min(axis=1)
     worst = int(smallest.argmin())
     if smallest[worst] <= 0.0:
         count = int((smallest <= 0.0).sum())
         raise MeshError(
             f"{count} of {len(nodes)} {kind} are turned inside out or flat, such as number "
-            f"{worst} at {place_text(places[worst].mean(axis=0))}: number its nodes in the "
+            f"{worst} at {place_text(points[worst].mean(axis=0))}: number its nodes in the "
             "order of VTK (in the plane counterclockwise)"
         )

@@ -12,9 +12,9 @@ def once(faces: Integers, corners: int, origin: Integers | None = None) -> Integ
 
     origin: number of each node, the same for copies of one.
     """
-    known = faces if origin is None else origin[faces]
+    originals = faces if origin is None else origin[faces]
     _, first, count = np.unique(
-        np.sort(known[:, :corners], axis=1), axis=0, return_index=True, return_counts=True
+        np.sort(originals[:, :corners], axis=1), axis=0, return_index=True, return_counts=True
     )
     return np.ascontiguousarray(faces[np.sort(first[count == 1])])
 
@@ -26,9 +26,9 @@ def firsts(rows: Integers) -> tuple[Integers, Integers]:
     keys = np.sort(rows, axis=1)
     _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
-    return first[order], place[inverse.ravel()]
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return first[order], rank[inverse.ravel()]
 
 
 def matched(faces: Integers, known: Integers, corners: int) -> Integers:
@@ -49,5 +49,5 @@ def as_known(faces: Integers, known: Integers, corners: int) -> Integers:
 
 def repeated(rows: Integers) -> Flags:
     """Which rows (n, k) have the nodes of a row before them."""
-    first, place = firsts(rows)
-    return np.asarray(first[place] != np.arange(len(rows)))
+    first, rank = firsts(rows)
+    return np.asarray(first[rank] != np.arange(len(rows)))

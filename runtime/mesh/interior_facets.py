@@ -31,15 +31,15 @@ def turns(kind: str) -> Integers:
     corners, middle = cell.nodes[: cell.corners], cell.nodes[: cell.corners].mean(axis=0)
     first = np.vstack([corners[list(cell.sides[0])], middle])
     from_first = np.linalg.pinv(np.column_stack([first, np.ones(len(first))]))
-    found = []
+    turned = []
     for face in cell.sides:
         for r in range(len(face)):
             to = np.vstack([corners[list(np.roll(face, -r))], middle])
             moved = np.column_stack([cell.nodes, np.ones(len(cell.nodes))]) @ from_first @ to
             distance = np.linalg.norm(cell.nodes[None] - moved[:, None], axis=2)
             assert distance.min(axis=1).max() < 1e-9
-            found.append(distance.argmin(axis=1))
-    return np.array(found).reshape(len(cell.sides), len(cell.sides[0]), len(cell.nodes))
+            turned.append(distance.argmin(axis=1))
+    return np.array(turned).reshape(len(cell.sides), len(cell.sides[0]), len(cell.nodes))
 
 
 def interior(mesh: Mesh, kind: str) -> Integers:
@@ -69,8 +69,8 @@ def beside(mesh: Mesh, where: str | Predicate, kind: str) -> Integers:
     turned, cells = turns(kind), mesh.cells[kind]
     every = cells[:, turned[:, 0]].reshape(-1, cells.shape[1])
     face, at = CELLS[kind].side_nodes[0]
-    there = mesh.outer_faces(where).get(face.name, np.empty((0, len(at)), dtype=np.int64))
-    rows = matched(there, every[:, list(at)], face.corners)
+    faces = mesh.outer_faces(where).get(face.name, np.empty((0, len(at)), dtype=np.int64))
+    rows = matched(faces, every[:, list(at)], face.corners)
     return np.ascontiguousarray(every[rows[rows >= 0]])
 
 
@@ -89,18 +89,18 @@ def split(mesh: Mesh) -> Mesh:
     sides: dict[str, dict[str, Integers]] = {}
     for name in mesh.sides:
         sides[name] = {}
-        for face, there in mesh.faces(name).items():
-            found, known = [], []
+        for face, side_faces in mesh.faces(name).items():
+            new_faces, cell_faces = [], []
             for kind, nodes in mesh.cells.items():
                 for of, local in CELLS[kind].side_nodes:
                     if of.name == face:
-                        known.append(nodes[:, list(local)])
-                        found.append(cells[kind][:, list(local)])
-            if not known:
-                sides[name][face] = _copies(mesh, cells, there)
+                        cell_faces.append(nodes[:, list(local)])
+                        new_faces.append(cells[kind][:, list(local)])
+            if not cell_faces:
+                sides[name][face] = _copies(mesh, cells, side_faces)
                 continue
-            rows = matched(there, np.concatenate(known), CELLS[face].corners)
-            sides[name][face] = np.concatenate(found)[rows]
+            rows = matched(side_faces, np.concatenate(cell_faces), CELLS[face].corners)
+            sides[name][face] = np.concatenate(new_faces)[rows]
     return Mesh(mesh.points[old], cells, mesh.groups, sides, mesh.origin[old])
 
 
@@ -108,13 +108,13 @@ def _copies(mesh: Mesh, cells: dict[str, Integers], rows: Integers) -> Integers:
     """Points, edges or cells (m, k), which are no faces of cells, in each of the cells (new nodes
     by kind) that have them.
     """
-    found = [np.empty((0, rows.shape[1]), dtype=np.int64)]
+    copies = [np.empty((0, rows.shape[1]), dtype=np.int64)]
     for kind, nodes in mesh.cells.items():
         if rows.shape[1] == 1:
-            found.append(cells[kind][np.isin(nodes, rows)][:, None])
+            copies.append(cells[kind][np.isin(nodes, rows)][:, None])
             continue
         for row in rows:
-            own = np.flatnonzero(np.isin(nodes, row).sum(axis=1) == len(row))
-            local = (nodes[own][:, None] == row[:, None]).argmax(axis=2)
-            found.append(np.take_along_axis(cells[kind][own], local, axis=1))
-    return np.concatenate(found)
+            cells_of_row = np.flatnonzero(np.isin(nodes, row).sum(axis=1) == len(row))
+            local = (nodes[cells_of_row][:, None] == row[:, None]).argmax(axis=2)
+            copies.append(np.take_along_axis(cells[kind][cells_of_row], local, axis=1))
+    return np.concatenate(copies)

@@ -85,8 +85,8 @@ class Mesh:
             raise MeshError('cells are given by their kinds, {"quad4": nodes}')
         self._own_arrays()
         if self.points.ndim != 2 or self.points.dtype.kind not in "fiu":
-            given = f"{self.points.dtype} of shape {self.points.shape}"
-            raise MeshError(f"points are {given}, must be real numbers of shape (n, dim)")
+            shape_text = f"{self.points.dtype} of shape {self.points.shape}"
+            raise MeshError(f"points are {shape_text}, must be real numbers of shape (n, dim)")
         if not np.isfinite(self.points).all():
             raise MeshError("points must be finite, one is not a number or infinite")
         faces = [faces for side in self.sides.values() for faces in side.items()]
@@ -105,22 +105,24 @@ class Mesh:
                 )
         numbers, shape = self.numbers, self.points.shape[:1]
         if numbers is not None and (numbers.dtype.kind not in "iu" or numbers.shape != shape):
-            wrong = f"{numbers.dtype} of shape {numbers.shape}"
-            raise MeshError(f"numbers of nodes are {wrong}, must be integers of shape {shape}")
+            numbers_text = f"{numbers.dtype} of shape {numbers.shape}"
+            raise MeshError(
+                f"numbers of nodes are {numbers_text}, must be integers of shape {shape}"
+            )
 
     def _own_arrays(self) -> None:
         """Copies of all arrays that can be written to by others; read-only, as are the mappings."""
         groups = {name: _owned(group, f"group {name!r}: ") for name, group in self.groups.items()}
         sides = {name: _owned(side, f"side {name!r}: ") for name, side in self.sides.items()}
-        own = {
+        arrays = {
             "points": _frozen("points", self.points),
             "cells": _owned(self.cells, ""),
             "groups": MappingProxyType(groups),
             "sides": MappingProxyType(sides),
         }
         if self.numbers is not None:
-            own["numbers"] = _frozen("numbers of nodes", self.numbers)
-        for name, value in own.items():
+            arrays["numbers"] = _frozen("numbers of nodes", self.numbers)
+        for name, value in arrays.items():
             object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
@@ -406,13 +408,13 @@ class Mesh:
         MeshError
             No cell is selected.
         """
-        chosen = {}
+        group = {}
         for kind, nodes in self.cells.items():
             inside = _told(where, self.points[nodes].mean(axis=1), name)
-            chosen[kind] = np.flatnonzero(inside)
-        if not self.anywhere(any(map(len, chosen.values()))):
+            group[kind] = np.flatnonzero(inside)
+        if not self.anywhere(any(map(len, group.values()))):
             raise MeshError(f"group {name!r}: the predicate chooses no cell")
-        return replace(self, groups={**self.groups, name: chosen})
+        return replace(self, groups={**self.groups, name: group})
 
     def split(self) -> Mesh:
         """Return the mesh with separate nodes for every cell, so that fields may jump.
@@ -488,13 +490,13 @@ class Mesh:
     @cached_property
     def boundary(self) -> Faces:
         """Faces that belong to one cell only, kind -> node numbers (m, k), seen from outside."""
-        found: dict[str, list[Integers]] = {}
+        by_kind: dict[str, list[Integers]] = {}
         for kind, nodes in self.cells.items():
             for face, local in CELLS[kind].side_nodes:
-                found.setdefault(face.name, []).append(nodes[:, list(local)])
+                by_kind.setdefault(face.name, []).append(nodes[:, list(local)])
         faces = {
             k: once(np.concatenate(parts), CELLS[k].corners, self.numbers)
-            for k, parts in found.items()
+            for k, parts in by_kind.items()
         }
         if self.piece is not None:
             cuts = self.piece.cuts
@@ -526,8 +528,8 @@ class Mesh:
         if where == "boundary" and where not in self.sides:
             return self.boundary
         if where not in self.sides:
-            known = ", ".join([*self.sides, "boundary"])
-            raise MeshError(f"no side {where!r}{meant(where, self.sides)}; there are {known}")
+            allowed = ", ".join([*self.sides, "boundary"])
+            raise MeshError(f"no side {where!r}{meant(where, self.sides)}; there are {allowed}")
         return {
             kind: as_known(faces, self.boundary[kind], CELLS[kind].corners)
             if kind in self.boundary
@@ -553,25 +555,25 @@ class Mesh:
         MeshError
             A face has another dimension than the boundary, or belongs to two cells or none.
         """
-        found = self.faces(where)
+        selected = self.faces(where)
         solid = any(CELLS[kind].dimension == self.dimension for kind in self.cells)
-        for kind, faces in found.items():
-            cell, known = CELLS[kind], self.boundary.get(kind, faces[:0])
+        for kind, faces in selected.items():
+            cell, outer = CELLS[kind], self.boundary.get(kind, faces[:0])
             if cell.dimension != self.dimension - 1:
                 name = "the predicate" if callable(where) else f"side {where!r}"
                 what = {0: "nodes", 1: "lines", 2: "faces"}.get(cell.dimension, "cells")
-                wanted = {1: "nodes", 2: "lines"}.get(self.dimension, "faces")
+                face_word = {1: "nodes", 2: "lines"}.get(self.dimension, "faces")
                 raise MeshError(
-                    f"{name} is of {what} ({kind}); in {self.dimension}-D a side of {wanted} of "
+                    f"{name} is of {what} ({kind}); in {self.dimension}-D a side of {face_word} of "
                     f"the boundary is needed, such as {few(self._outer_sides())}"
                 )
-            lost = faces[matched(faces, known, cell.corners) < 0] if solid else faces[:0]
+            lost = faces[matched(faces, outer, cell.corners) < 0] if solid else faces[:0]
             if len(lost):
-                place = place_text(self.points[lost[0]].mean(axis=0))
+                point_text = place_text(self.points[lost[0]].mean(axis=0))
                 raise MeshError(
-                    f"the face at {place} is of two cells or of none: it has no outside"
+                    f"the face at {point_text} is of two cells or of none: it has no outside"
                 )
-        return found
+        return selected
 
     def _outer_sides(self) -> list[str]:
         """Names of sides of faces of one dimension less than the mesh."""
@@ -600,16 +602,16 @@ class Mesh:
             There is no such side or group, or no node is selected.
         """
         if callable(where):
-            chosen = np.flatnonzero(_told(where, self.points, "the predicate"))
-            if not self.anywhere(len(chosen)):
+            selected = np.flatnonzero(_told(where, self.points, "the predicate"))
+            if not self.anywhere(len(selected)):
                 raise MeshError("the predicate chooses no node")
-            return chosen
+            return selected
         if where in self.groups and where not in self.sides:
-            parts = [self.cells[kind][chosen] for kind, chosen in self.groups[where].items()]
+            parts = [self.cells[kind][selected] for kind, selected in self.groups[where].items()]
         else:
             parts = list(self.faces(where).values())
-        found = np.unique(np.concatenate([part.ravel() for part in parts]))
-        return found if self.piece is None else self.piece.everywhere(found)
+        unique = np.unique(np.concatenate([part.ravel() for part in parts]))
+        return unique if self.piece is None else self.piece.everywhere(unique)
 
     def cells_of(self, group: str | None) -> Mapping[str, Integers]:
         """Return the cells of a group.
@@ -632,12 +634,12 @@ class Mesh:
         if group is None:
             return self.cells
         if group not in self.groups:
-            known = ", ".join(self.groups) or "none"
-            raise MeshError(f"no group {group!r}{meant(group, self.groups)}; there are {known}")
+            allowed = ", ".join(self.groups) or "none"
+            raise MeshError(f"no group {group!r}{meant(group, self.groups)}; there are {allowed}")
         return {
-            kind: self.cells[kind][chosen]
-            for kind, chosen in self.groups[group].items()
-            if self.anywhere(len(chosen))
+            kind: self.cells[kind][numbers]
+            for kind, numbers in self.groups[group].items()
+            if self.anywhere(len(numbers))
         }
 
     def node_at(self, place: Array) -> int:
@@ -688,17 +690,17 @@ class Mesh:
             There is no node on any process, or there are nodes of several bodies.
         """
         place = self._placed(place)
-        near = np.linalg.norm(self.points - place, axis=1) <= _NEAR * self._size
-        found = np.flatnonzero(near)
+        mask = np.linalg.norm(self.points - place, axis=1) <= _NEAR * self._size
+        nodes = np.flatnonzero(mask)
         if self.piece is not None:
-            found = self.piece.everywhere(found)
-            if not self.anywhere(len(found)):
+            nodes = self.piece.everywhere(nodes)
+            if not self.anywhere(len(nodes)):
                 raise MeshError(f"no node at {place_text(place)}, in any part of the mesh")
-        elif self.numbers is None or not len(found):
+        elif self.numbers is None or not len(nodes):
             return np.array([self.node_at(place)])
-        if len(np.unique(self.origin[found])) > 1:
-            self._require_one(found, place)
-        return found
+        if len(np.unique(self.origin[nodes])) > 1:
+            self._require_one(nodes, place)
+        return nodes
 
     def _require_one(self, nodes: Integers, place: Array) -> None:
         if len(nodes) > 1:
@@ -727,12 +729,12 @@ class Mesh:
         MeshError
             The place lies outside the mesh.
         """
-        found = self.holding(self._placed(place)[None])
-        if not len(found.point):
+        located = self.holding(self._placed(place)[None])
+        if not len(located.point):
             raise MeshError(f"{place_text(np.asarray(place))} lies outside the mesh")
-        cell = CELLS[found.kinds[found.kind[0]]]
-        weights = cell.shape(found.parent[:1, : cell.dimension])[0]
-        return self.cells[cell.name][found.row[0]], weights
+        cell = CELLS[located.kinds[located.kind[0]]]
+        weights = cell.shape(located.parent[:1, : cell.dimension])[0]
+        return self.cells[cell.name][located.row[0]], weights
 
     def holding(self, places: Array, group: str | None = None) -> Located:
         """Return the cells that contain places.
@@ -756,14 +758,14 @@ class Mesh:
         """
         places = np.asarray(places, dtype=np.float64)
         if places.ndim != 2 or places.shape[1] != self.dimension or not np.isfinite(places).all():
-            places = np.stack([self._placed(place) for place in places])
+            places = np.stack([self._placed(point) for point in places])
         if group is None:
             return self._locator.holding(places)
         self.cells_of(group)
-        chosen = {kind: np.zeros(len(nodes), np.bool_) for kind, nodes in self.cells.items()}
+        masks = {kind: np.zeros(len(nodes), np.bool_) for kind, nodes in self.cells.items()}
         for kind, rows in self.groups[group].items():
-            chosen[kind][rows] = True
-        return self._locator.holding(places, chosen)
+            masks[kind][rows] = True
+        return self._locator.holding(places, masks)
 
     @cached_property
     def _locator(self) -> PointLocator:
@@ -779,10 +781,10 @@ class Mesh:
         """A place as an array, which may be given as a tuple.  Raises MeshError."""
         if isinstance(given, np.ma.MaskedArray) or np.asarray(given).dtype == np.bool_:
             raise MeshError(f"a place has {self.dimension} numbers, given {given!r}")
-        place = np.asarray(given, dtype=np.float64)
-        if place.shape != (self.dimension,) or not np.isfinite(place).all():
-            raise MeshError(f"a place has {self.dimension} coordinates, given {place.tolist()}")
-        return place
+        point = np.asarray(given, dtype=np.float64)
+        if point.shape != (self.dimension,) or not np.isfinite(point).all():
+            raise MeshError(f"a place has {self.dimension} coordinates, given {point.tolist()}")
+        return point
 
     def check(self) -> None:
         """Check that no cell is inverted, and that no cell or face of a side occurs twice.
@@ -798,11 +800,13 @@ class Mesh:
 
     def _meant_faces(self, where: Predicate, name: str) -> Faces:
         inside = _told(where, self.points, name)
-        found = {kind: faces[inside[faces].all(axis=1)] for kind, faces in self.boundary.items()}
-        there = {kind: faces for kind, faces in found.items() if self.anywhere(len(faces))}
-        if not there:
+        candidates = {
+            kind: faces[inside[faces].all(axis=1)] for kind, faces in self.boundary.items()
+        }
+        present = {kind: faces for kind, faces in candidates.items() if self.anywhere(len(faces))}
+        if not present:
             raise MeshError(f"side {name!r}: no face of the boundary has all its nodes there")
-        return there
+        return present
 
 
 def _frozen(name: str, given: Any) -> NDArray[Any]:
@@ -818,16 +822,16 @@ def _owned(arrays: Mapping[str, Any], words: str) -> Mapping[str, Any]:
 
 
 def _told(where: Predicate, places: Array, name: str) -> Flags:
-    wrong = misfit(where, "x")
-    if wrong:
-        raise MeshError(f"{name}: {wrong}, x of shape (n, dim)")
-    chosen = np.asarray(where(places))
-    if chosen.shape != (len(places),) or chosen.dtype != np.bool_:
+    signature_error = misfit(where, "x")
+    if signature_error:
+        raise MeshError(f"{name}: {signature_error}, x of shape (n, dim)")
+    selected = np.asarray(where(places))
+    if selected.shape != (len(places),) or selected.dtype != np.bool_:
         raise MeshError(
             f"{name}: a predicate takes places of shape {places.shape} and gives booleans of shape "
-            f"({len(places)},); this one gave {chosen.dtype} of shape {chosen.shape}"
+            f"({len(places)},); this one gave {selected.dtype} of shape {selected.shape}"
         )
-    return chosen
+    return selected
 
 
 def place_text(x: Array) -> str:

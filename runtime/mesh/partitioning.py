@@ -35,35 +35,37 @@ class Piece:
     @property
     def owned(self) -> Flags:
         """(n,): whether a node is this process's own: no process before it has the node."""
-        found: Flags = np.ones(len(self.numbers), dtype=bool)
+        is_owned: Flags = np.ones(len(self.numbers), dtype=bool)
         for process, nodes in self.shared.items():
             if process < world().rank:
-                found[nodes] = False
-        return found
+                is_owned[nodes] = False
+        return is_owned
 
     def told(self, values: Array | Flags | Integers) -> dict[int, Any]:
         """Of values (..., n) at nodes what the others have at shared ones: process -> (..., k)."""
         comm = world()
         sent = [values[..., self.shared[p]] if p in self.shared else None for p in range(comm.size)]
-        return {p: found for p, found in enumerate(comm.alltoall(sent)) if found is not None}
+        return {
+            p: received for p, received in enumerate(comm.alltoall(sent)) if received is not None
+        }
 
     def added(self, values: Array) -> Array:
         """Sums (n,) of values at nodes over all processes, in the order of the processes."""
-        rank, told, found = world().rank, self.told(values), np.zeros(len(values))
-        for process in sorted([rank, *told]):
+        rank, received, sums = world().rank, self.told(values), np.zeros(len(values))
+        for process in sorted([rank, *received]):
             if process == rank:
-                found += values
+                sums += values
             else:
-                found[self.shared[process]] += told[process]
-        return found
+                sums[self.shared[process]] += received[process]
+        return sums
 
     def everywhere(self, nodes: Integers) -> Integers:
         """Nodes that this process or another one means, sorted."""
-        meant: Flags = np.zeros(len(self.numbers), dtype=bool)
-        meant[nodes] = True
-        for process, there in self.told(meant).items():
-            meant[self.shared[process][there]] = True
-        return np.flatnonzero(meant)
+        mask: Flags = np.zeros(len(self.numbers), dtype=bool)
+        mask[nodes] = True
+        for process, flags in self.told(mask).items():
+            mask[self.shared[process][flags]] = True
+        return np.flatnonzero(mask)
 
     def anywhere(self, something: object) -> bool:
         """True if a process has something."""
@@ -76,8 +78,10 @@ def joined(mesh: Mesh, numbers: Integers) -> Mesh:
     All processes then know the same kinds of cells and the same names, of which they may have none.
     """
     mesh = _with_names_of_all(mesh)
-    ends = np.concatenate([np.empty(0, np.int64), *(f.ravel() for f in mesh.boundary.values())])
-    shared = _shared(numbers, np.unique(ends))
+    boundary_nodes = np.concatenate(
+        [np.empty(0, np.int64), *(f.ravel() for f in mesh.boundary.values())]
+    )
+    shared = _shared(numbers, np.unique(boundary_nodes))
     cuts = {
         kind: faces[_common(faces, CELLS[kind].corners, numbers, shared)]
         for kind, faces in mesh.boundary.items()
@@ -94,27 +98,27 @@ def joined(mesh: Mesh, numbers: Integers) -> Mesh:
 
 def _with_names_of_all(mesh: Mesh) -> Mesh:
     kinds: dict[str, dict[str, dict[str, None]]] = {"cells": {}, "groups": {}, "sides": {}}
-    here = {
+    local_names = {
         "cells": {"": list(mesh.cells)},
         "groups": {name: list(group) for name, group in mesh.groups.items()},
         "sides": {name: list(side) for name, side in mesh.sides.items()},
     }
-    for there in world().allgather(here):
-        for what, names in there.items():
-            for name, found in names.items():
-                kinds[what].setdefault(name, {}).update(dict.fromkeys(found))
+    for other_names in world().allgather(local_names):
+        for what, names in other_names.items():
+            for name, members in names.items():
+                kinds[what].setdefault(name, {}).update(dict.fromkeys(members))
     none = np.empty(0, dtype=np.int64)
     empty = {kind: np.empty((0, len(cell.nodes)), dtype=np.int64) for kind, cell in CELLS.items()}
     return replace(
         mesh,
         cells={kind: mesh.cells.get(kind, empty[kind]) for kind in kinds["cells"][""]},
         groups={
-            name: {kind: mesh.groups.get(name, {}).get(kind, none) for kind in found}
-            for name, found in kinds["groups"].items()
+            name: {kind: mesh.groups.get(name, {}).get(kind, none) for kind in members}
+            for name, members in kinds["groups"].items()
         },
         sides={
-            name: {kind: mesh.sides.get(name, {}).get(kind, empty[kind]) for kind in found}
-            for name, found in kinds["sides"].items()
+            name: {kind: mesh.sides.get(name, {}).get(kind, empty[kind]) for kind in members}
+            for name, members in kinds["sides"].items()
         },
     )
 
@@ -124,25 +128,25 @@ def _shared(numbers: Integers, ends: Integers) -> dict[int, Integers]:
 
     A node is looked up by the process that its number falls to, which no process chooses.
     """
-    comm, known = world(), numbers[ends]
-    asked = comm.alltoall([known[known % comm.size == p] for p in range(comm.size)])
-    every = np.concatenate(asked)
-    process = np.repeat(np.arange(comm.size), [len(part) for part in asked])
+    comm, end_numbers = world(), numbers[ends]
+    received = comm.alltoall([end_numbers[end_numbers % comm.size == p] for p in range(comm.size)])
+    every = np.concatenate(received)
+    process = np.repeat(np.arange(comm.size), [len(part) for part in received])
     order = np.lexsort((process, every))
     every, process = every[order], process[order]
     pairs: list[list[Integers]] = [[np.empty((0, 2), np.int64)] for _ in range(comm.size)]
-    for apart in range(1, comm.size):
-        at = np.flatnonzero(every[apart:] == every[:-apart])
-        for one, other in ((at, at + apart), (at + apart, at)):
+    for offset in range(1, comm.size):
+        at = np.flatnonzero(every[offset:] == every[:-offset])
+        for one, other in ((at, at + offset), (at + offset, at)):
             for p in range(comm.size):
-                mine = process[one] == p
-                row = np.stack([every[one][mine], process[other][mine]], axis=1)
+                mask = process[one] == p
+                row = np.stack([every[one][mask], process[other][mask]], axis=1)
                 pairs[p].append(row)
-    told = np.concatenate(comm.alltoall([np.concatenate(rows) for rows in pairs]))
-    told = told[np.argsort(told[:, 0], kind="stable")]
-    rank = np.argsort(known)
-    place = ends[rank[np.searchsorted(known[rank], told[:, 0])]]
-    return {int(p): place[told[:, 1] == p] for p in np.unique(told[:, 1])}
+    pairs_here = np.concatenate(comm.alltoall([np.concatenate(rows) for rows in pairs]))
+    pairs_here = pairs_here[np.argsort(pairs_here[:, 0], kind="stable")]
+    rank = np.argsort(end_numbers)
+    nodes = ends[rank[np.searchsorted(end_numbers[rank], pairs_here[:, 0])]]
+    return {int(p): nodes[pairs_here[:, 1] == p] for p in np.unique(pairs_here[:, 1])}
 
 
 def _common(
@@ -156,13 +160,13 @@ def _common(
     """Which of the faces (m, k) another process has too; before: one of lower number."""
     comm = world()
     sent: list[Any] = [None] * comm.size
-    own = numbers[faces[:, :corners]]
+    corners_here = numbers[faces[:, :corners]]
     for process, nodes in shared.items():
-        here = np.zeros(len(numbers), dtype=bool)
-        here[nodes] = True
-        sent[process] = own[here[faces[:, :corners]].all(axis=1)]
-    found: Flags = np.zeros(len(faces), dtype=bool)
-    for process, theirs in enumerate(comm.alltoall(sent)):
-        if theirs is not None and len(theirs) and (process < comm.rank or not before):
-            found |= matched(own, theirs, corners) >= 0
-    return found
+        node_mask = np.zeros(len(numbers), dtype=bool)
+        node_mask[nodes] = True
+        sent[process] = corners_here[node_mask[faces[:, :corners]].all(axis=1)]
+    is_common: Flags = np.zeros(len(faces), dtype=bool)
+    for process, other_faces in enumerate(comm.alltoall(sent)):
+        if other_faces is not None and len(other_faces) and (process < comm.rank or not before):
+            is_common |= matched(corners_here, other_faces, corners) >= 0
+    return is_common

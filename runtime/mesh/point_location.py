@@ -43,9 +43,9 @@ class Located:
     def by_kind(self) -> Iterator[tuple[str, Integers]]:
         """Each kind, and which pairs (k,) have it."""
         for number, kind in enumerate(self.kinds):
-            chosen = np.flatnonzero(self.kind == number)
-            if len(chosen):
-                yield kind, chosen
+            rows = np.flatnonzero(self.kind == number)
+            if len(rows):
+                yield kind, rows
 
     @cached_property
     def first(self) -> Integers:
@@ -81,21 +81,23 @@ class PointLocator:
         """Cells that hold the places (n, dim), of the chosen ones: kind -> (m,) booleans."""
         places = np.asarray(places, dtype=np.float64)
         left, done = np.arange(len(places)), 0
-        found: list[_Pairs] = []
+        pairs: list[_Pairs] = []
         for number, kind in enumerate(self.kinds):
             if CELLS[kind].dimension != done:  # nothing of a lower dimension where a cell is
                 done = CELLS[kind].dimension
-                for _, point, *_ in found:
+                for _, point, *_ in pairs:
                     left = np.setdiff1d(left, point)
             point, row = self._candidates(kind, places[left], np.zeros(len(left)))
             point = left[point]
             if chosen is not None:
-                kept = chosen.get(kind, np.zeros(len(self.cells[kind]), np.bool_))[row]
-                point, row = point[kept], row[kept]
+                in_cells = chosen.get(kind, np.zeros(len(self.cells[kind]), np.bool_))[row]
+                point, row = point[in_cells], row[in_cells]
             parent, distance = self._feet(kind, row, places[point])
-            held = distance <= self.near
-            found.append((np.full(held.sum(), number), point[held], row[held], parent[held]))
-        return self._sorted(found)
+            inside = distance <= self.near
+            pairs.append(
+                (np.full(inside.sum(), number), point[inside], row[inside], parent[inside])
+            )
+        return self._sorted(pairs)
 
     def nearest(self, places: Array) -> Located:
         """The nearest cell of each place (n, dim), and the parent coordinates of its point that
@@ -103,16 +105,22 @@ class PointLocator:
         """
         places = np.asarray(places, dtype=np.float64)
         reach = np.asarray(self._nodes.query(places)[0])  # no cell is further than the next node
-        found, distances = [], []
+        pairs, distances = [], []
         for number, kind in enumerate(self.kinds):
             point, row = self._candidates(kind, places, reach)
             parent, distance = self._feet(kind, row, places[point])
-            found.append((np.full(len(row), number), point, row, parent))
+            pairs.append((np.full(len(row), number), point, row, parent))
             distances.append(distance)
-        kind_of, point, row, parent = (np.concatenate(part) for part in zip(*found, strict=True))
+        kind_of, point, row, parent = (np.concatenate(part) for part in zip(*pairs, strict=True))
         order = np.lexsort((row, kind_of, np.concatenate(distances), point))
-        chosen = order[np.unique(point[order], return_index=True)[1]]
-        return Located(self.kinds, point[chosen], kind_of[chosen], row[chosen], parent[chosen])
+        nearest_pairs = order[np.unique(point[order], return_index=True)[1]]
+        return Located(
+            self.kinds,
+            point[nearest_pairs],
+            kind_of[nearest_pairs],
+            row[nearest_pairs],
+            parent[nearest_pairs],
+        )
 
     def _sorted(self, found: list[_Pairs]) -> Located:
         if not found:
@@ -129,12 +137,12 @@ class PointLocator:
             lists = boxes.tree.query_ball_point(places, boxes.radius + reach, return_sorted=False)
             count = np.fromiter(map(len, lists), np.int64, len(lists))
             point = np.repeat(np.arange(len(places)), count)
-            own = np.concatenate([np.empty(0, np.int64), *lists]).astype(np.int64)
+            members = np.concatenate([np.empty(0, np.int64), *lists]).astype(np.int64)
             x = places[point]
-            away = np.maximum(np.maximum(boxes.low[own] - x, x - boxes.high[own]), 0.0)
-            kept = np.linalg.norm(away, axis=1) <= reach[point]
-            points.append(point[kept])
-            rows.append(boxes.rows[own[kept]])
+            away = np.maximum(np.maximum(boxes.low[members] - x, x - boxes.high[members]), 0.0)
+            close = np.linalg.norm(away, axis=1) <= reach[point]
+            points.append(point[close])
+            rows.append(boxes.rows[members[close]])
         return np.concatenate(points), np.concatenate(rows)
 
     def _feet(self, kind: str, rows: Integers, places: Array) -> tuple[Array, Array]:
@@ -229,8 +237,8 @@ def _inverse(cell: Cell, x: Array, places: Array, near: float) -> tuple[Array, A
         start = cell.nodes[np.linalg.norm(x[again] - places[again, None], axis=2).argmin(axis=1)]
         other = _newton(cell, x[again], places[again], 0.9 * start + 0.1 * centre)
         better = _distance(cell, x[again], places[again], other)
-        chosen = again[better < distance[again]]
-        xi[chosen] = other[better < distance[again]]
+        improved = again[better < distance[again]]
+        xi[improved] = other[better < distance[again]]
         distance = _distance(cell, x, places, xi)
     return _clipped(cell, xi, 0.0), distance
 
@@ -279,15 +287,17 @@ def _clipped(cell: Cell, xi: Array, beyond: float) -> Array:
     if cell.corners == 2**cell.dimension:
         return np.clip(xi, -1.0 - beyond, 1.0 + beyond)
     flat = 3 if cell.corners == 4 else 2  # coordinates of the simplex
-    found = xi.copy()
-    shares = np.maximum(xi[:, :flat], -beyond)
-    total = shares.sum(axis=1, keepdims=True)
+    clipped = xi.copy()
+    barycentric = np.maximum(xi[:, :flat], -beyond)
+    total = barycentric.sum(axis=1, keepdims=True)
     over = np.maximum(total - 1.0 - beyond, 0.0)
-    found[:, :flat] = shares
+    clipped[:, :flat] = barycentric
     if beyond == 0.0:
-        found[:, :flat] = np.where(over > 0.0, shares / np.where(over > 0.0, total, 1.0), shares)
+        clipped[:, :flat] = np.where(
+            over > 0.0, barycentric / np.where(over > 0.0, total, 1.0), barycentric
+        )
     else:
-        found[:, :flat] -= over / flat
+        clipped[:, :flat] -= over / flat
     if cell.corners == 6:
-        found[:, 2] = np.clip(xi[:, 2], -1.0 - beyond, 1.0 + beyond)
-    return found
+        clipped[:, 2] = np.clip(xi[:, 2], -1.0 - beyond, 1.0 + beyond)
+    return clipped

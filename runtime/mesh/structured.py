@@ -61,9 +61,9 @@ def grid(
     mesh = replace(mesh, sides=_sides(mesh, size))
     if processes == 1:
         return mesh
-    here = np.unravel_index(used, [len(axis) for axis in axes], order="F")
+    index = np.unravel_index(used, [len(axis) for axis in axes], order="F")
     strides = np.cumprod([1, *(order * n + 1 for n in counts[:-1])])
-    moved = [at + order * first for at, (first, _) in zip(here, spans, strict=True)]
+    moved = [at + order * first for at, (first, _) in zip(index, spans, strict=True)]
     return joined(mesh, np.stack(moved, axis=1) @ strides)
 
 
@@ -72,19 +72,19 @@ def _span(counts: Sequence[int], rank: int, processes: int) -> list[tuple[int, i
 
     The box is cut into equal boxes with the least area between them.
     """
-    whole = [range(1, processes + 1)] * len(counts)
+    divisors = [range(1, processes + 1)] * len(counts)
     fit = [
         cuts
-        for cuts in product(*whole)
+        for cuts in product(*divisors)
         if prod(cuts) == processes and all(c <= n for c, n in zip(cuts, counts, strict=True))
     ]
     if not fit:
         raise MeshError(f"cells = {tuple(counts)}: too few to be cut for {processes} processes")
     cuts = min(fit, key=lambda cuts: sum((c - 1) / n for c, n in zip(cuts, counts, strict=True)))
-    place = np.unravel_index(rank, cuts, order="F")
+    index = np.unravel_index(rank, cuts, order="F")
     return [
         (n * int(k) // c, n * (int(k) + 1) // c)
-        for k, c, n in zip(place, cuts, counts, strict=True)
+        for k, c, n in zip(index, cuts, counts, strict=True)
     ]
 
 
@@ -104,8 +104,8 @@ def _kind(dimension: int, order: int, shape: str) -> str:
     kinds = KINDS[dimension, shape]
     kind = kinds[order - 1] if order in range(1, len(kinds) + 1) else ""
     if not kind:
-        known = {"serendipity": "2", "wedge": "1"}
-        orders = known.get(shape, "1 or 2" if len(kinds) == 2 else f"1 to {len(kinds)}")
+        suffixes = {"serendipity": "2", "wedge": "1"}
+        orders = suffixes.get(shape, "1 or 2" if len(kinds) == 2 else f"1 to {len(kinds)}")
         raise MeshError(f"order = {order}: {shape} cells have order {orders}")
     return kind
 
@@ -129,7 +129,7 @@ def _numbers(kind: str, counts: Sequence[int], order: int) -> Integers:
 
 def _simplices(dimension: int) -> list[Array]:
     """Corners of the simplices that share the main diagonal of the unit cube, positive all."""
-    found = []
+    simplices = []
     for order in permutations(range(dimension)):
         corners = np.zeros((dimension + 1, dimension))
         for k, axis in enumerate(order):
@@ -137,8 +137,8 @@ def _simplices(dimension: int) -> list[Array]:
             corners[k + 1, axis] = 1.0
         if np.linalg.det(corners[1:] - corners[0]) < 0.0:
             corners[[-1, -2]] = corners[[-2, -1]]
-        found.append(corners)
-    return found
+        simplices.append(corners)
+    return simplices
 
 
 def _wedge(triangle: Array) -> Array:
@@ -154,12 +154,12 @@ def _simplex(kind: str, corners: Array) -> Array:
 def _sides(mesh: Mesh, size: Sequence[float]) -> dict[str, dict[str, Integers]]:
     """Faces at the smallest and largest coordinate of each axis."""
     if mesh.dimension == 1:
-        ends = [np.flatnonzero(mesh.points[:, 0] == end) for end in (0.0, size[0])]
-        return {n: {"point1": e[:, None]} for n, e in zip(SIDES[1], ends, strict=True)}
+        end_nodes = [np.flatnonzero(mesh.points[:, 0] == end) for end in (0.0, size[0])]
+        return {n: {"point1": e[:, None]} for n, e in zip(SIDES[1], end_nodes, strict=True)}
     named = {}
     for k, name in enumerate(SIDES[mesh.dimension]):
         axis, bound = k // 2, (0.0, size[k // 2])[k % 2]
-        there = np.abs(mesh.points[:, axis] - bound) <= 1e-12 * size[axis]
-        faces = {kind: f[there[f].all(axis=1)] for kind, f in mesh.boundary.items()}
+        on_bound = np.abs(mesh.points[:, axis] - bound) <= 1e-12 * size[axis]
+        faces = {kind: f[on_bound[f].all(axis=1)] for kind, f in mesh.boundary.items()}
         named[name] = {kind: f for kind, f in faces.items() if len(f)}
     return named

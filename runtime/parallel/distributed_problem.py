@@ -53,14 +53,14 @@ class Team:
 
     def tangent_of(self, problem: Problem) -> Operator:
         """The matrix for the prescribed unknowns of a problem, or a new shell."""
-        known = self.tangent
-        same = isinstance(known, Tangent) and known.serves(problem.assembler, problem.fixed)
-        if world().allreduce(int(not same)) or known is None:
-            if known is not None:
-                known.matrix.destroy()  # a shell and PETSc's matrix hold each other
+        tangent = self.tangent
+        same = isinstance(tangent, Tangent) and tangent.serves(problem.assembler, problem.fixed)
+        if world().allreduce(int(not same)) or tangent is None:
+            if tangent is not None:
+                tangent.matrix.destroy()  # a shell and PETSc's matrix hold each other
             self.solver.reset()
-            self.tangent = known = self._new(problem)
-        return known
+            self.tangent = tangent = self._new(problem)
+        return tangent
 
     def _new(self, problem: Problem) -> Operator:
         if self.levels is not None:
@@ -89,15 +89,15 @@ class Factors:
             y = self.solve(random_signs(len(exchange.owned), world().rank))[exchange.owned]
         except SingularMatrix:
             return None
-        most = float(largest(np.abs(y).max(initial=0.0)))
-        y = without_small_entries(y, most)
+        largest_entry = float(largest(np.abs(y).max(initial=0.0)))
+        y = without_small_entries(y, largest_entry)
         resisted = np.abs(self.tangent.times(y)) > SINGULAR * self.tangent.times_magnitudes(
             np.abs(y)
         )
         if world().allreduce(int(resisted.any())):
             return None
-        mine = exchange.numbers[exchange.owned[np.abs(y) >= most]]
-        number: int = max(world().allgather(int(mine.max(initial=-1))))
+        candidates = exchange.numbers[exchange.owned[np.abs(y) >= largest_entry]]
+        number: int = max(world().allgather(int(candidates.max(initial=-1))))
         return number
 
 
@@ -164,61 +164,61 @@ class Spread:
 
     def measure(self, x: Array, K: Factors | None, *, rounded: bool = False) -> float:
         """See `Problem.measure`: the same sums, over all processes."""
-        own, exchange, problem = self.team.part.owned, self.team.exchange, self.problem
+        owned, exchange, problem = self.team.part.owned, self.team.exchange, self.problem
         sums = problem.assembler.residual_and_size(x, self.parameters)
         r, forces = exchange.added(sums[0]), exchange.added(sums[1])
         if total(np.array([float(not np.isfinite(r).all())]))[0]:
             return float("inf")
-        noise, terms = np.zeros(len(own)), np.zeros(len(own))
+        noise, terms = np.zeros(len(owned)), np.zeros(len(owned))
         if K is not None:
             if self._is_lost(x, forces, K):
                 return 1.0
-            terms = self._terms(np.abs(x)[own], K)
+            terms = self._terms(np.abs(x)[owned], K)
             if rounded:
-                noise = ROUNDING * self._terms(np.abs(x)[own] + self._reach(), K)
-        wanted = self._wanted(x)
+                noise = ROUNDING * self._terms(np.abs(x)[owned] + self._reach(), K)
+        target = self._wanted(x)
         free = np.ones(len(x), dtype=bool)
         free[problem.fixed] = False
-        defect = np.maximum(np.abs(r) - noise, 0.0) * free[own]
-        off, extent = (x - wanted)[own], np.maximum(np.abs(x), np.abs(wanted))[own]
-        met = ~free[own] | (self._counts() > 1)
-        balance = Balance(defect, forces, terms, met, off, extent)
+        defect = np.maximum(np.abs(r) - noise, 0.0) * free[owned]
+        deviation, extent = (x - target)[owned], np.maximum(np.abs(x), np.abs(target))[owned]
+        met = ~free[owned] | (self._counts() > 1)
+        balance = Balance(defect, forces, terms, met, deviation, extent)
         return size(total(balance.squares(self._fields())), largest(balance.worst()))
 
     def name_of(self, number: int) -> str:
         """An unknown for messages, by PETSc's number."""
         exchange, part = self.team.exchange, self.team.part
-        there = np.flatnonzero(exchange.numbers == number)
-        words = ""
-        if len(there):
+        local = np.flatnonzero(exchange.numbers == number)
+        message = ""
+        if len(local):
             layout = self.problem.layout
-            field_name = next(n for n in layout.names if there[0] < layout.part(n).stop)
-            whole, n = part.system.everywhere, int(part.unknowns[there[0]])
-            place = unknown_name(whole.assembler.blocks, n)
-            words = f"unknown {n} of field {field_name!r}{place}"
-        return _first(words)
+            field_name = next(n for n in layout.names if local[0] < layout.part(n).stop)
+            system, n = part.system.everywhere, int(part.unknowns[local[0]])
+            element = unknown_name(system.assembler.blocks, n)
+            message = f"unknown {n} of field {field_name!r}{element}"
+        return _first(message)
 
     def where_not_finite(self, x: Array) -> str:
         """The first element of any process whose residual or tangent is not finite."""
-        part, words = self.team.part, ""
+        part, message = self.team.part, ""
         for block in self.problem.assembler.blocks:
             results = block.tangent(x, self.parameters[block.name])
             rows = rows_not_finite(*results)
-            if len(rows) and not words and block.name in part.elements:
-                whole = part.system.everywhere.assembler.block(block.name)
-                words = element_name(whole, int(part.elements[block.name][rows[0]]))
-        return _first(words)
+            if len(rows) and not message and block.name in part.elements:
+                global_block = part.system.everywhere.assembler.block(block.name)
+                message = element_name(global_block, int(part.elements[block.name][rows[0]]))
+        return _first(message)
 
     def _wanted(self, x: Array) -> Array:
         """x with the prescribed values."""
-        wanted = x.copy()
-        wanted[self.problem.fixed] = self.problem.values
-        return wanted
+        target = x.copy()
+        target[self.problem.fixed] = self.problem.values
+        return target
 
     def _prescribed(self, r: Array, defect: Array) -> Array:
-        own = self.team.part.owned
-        fixed = np.isin(own, self.problem.fixed)
-        r[fixed] = defect[own][fixed]
+        owned = self.team.part.owned
+        fixed = np.isin(owned, self.problem.fixed)
+        r[fixed] = defect[owned][fixed]
         return r
 
     def _reach(self) -> Array:
@@ -247,8 +247,8 @@ class Spread:
         """See `Problem`."""
         reach = self._reach()
         values = np.abs(self.problem.values).max(initial=0.0)
-        known = largest(max(float(reach.max(initial=0.0)), float(values)))
-        if not is_far(largest(float(np.abs(x).max(initial=0.0))), known):
+        reference = largest(max(float(reach.max(initial=0.0)), float(values)))
+        if not is_far(largest(float(np.abs(x).max(initial=0.0))), reference):
             return False
         noise = ROUNDING * K.tangent.times_magnitudes(np.abs(x)[self.team.part.owned] + reach)
         norms = np.sqrt(total(np.array([noise @ noise, forces @ forces])))
@@ -256,8 +256,8 @@ class Spread:
 
     def _fields(self) -> list[Integers]:
         """For each field the places of its unknowns among own ones."""
-        own = self.team.part.owned
-        return [np.flatnonzero(np.isin(own, numbers)) for numbers in self.problem.layout.fields]
+        owned = self.team.part.owned
+        return [np.flatnonzero(np.isin(owned, numbers)) for numbers in self.problem.layout.fields]
 
 
 def _first(words: str) -> str:

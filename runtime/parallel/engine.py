@@ -63,8 +63,8 @@ class Serial:
     def spread(self, system: System) -> System:
         """See `Engine`."""
         system.mesh.require_whole('engine = "serial"')
-        near = modes_by_multigrid(system, self.linear)
-        return system if near is None else replace(system, share=Large(near))
+        nullspace = modes_by_multigrid(system, self.linear)
+        return system if nullspace is None else replace(system, share=Large(nullspace))
 
     def newton(self, system: System, given: Newton | None) -> Newton:
         """See `Engine`."""

@@ -37,10 +37,10 @@ class Exchange:
         vector = PETSc.Vec().createMPI((int(last - first), int(starts[-1])), comm=comm)
         vector.setBlockSize(1)
         copies = PETSc.Vec().createSeq(len(numbers))
-        chosen = PETSc.IS().createGeneral(numbers.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-        scatter = PETSc.Scatter().create(vector, chosen, copies, None)
-        ghosts, places = len(numbers) - len(owned), numbers[owned] - first
-        return cls(numbers, owned, places, vector, copies, scatter, ghosts)
+        index_set = PETSc.IS().createGeneral(numbers.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        scatter = PETSc.Scatter().create(vector, index_set, copies, None)
+        ghosts, positions = len(numbers) - len(owned), numbers[owned] - first
+        return cls(numbers, owned, positions, vector, copies, scatter, ghosts)
 
     def local(self, vector: Any) -> Array:
         """The local vector (m,) of one of PETSc's: own values and copies of the neighbours'."""
@@ -52,9 +52,9 @@ class Exchange:
     def copied(self, own: Array) -> Array:
         """The local vector (m,) of own values (k,)."""
         vector = self.to_petsc(own)
-        found = self.local(vector)
+        local = self.local(vector)
         vector.destroy()
-        return found
+        return local
 
     def added(self, x: Array) -> Array:
         """Of sums (m,) over own elements those over all: of own unknowns, (k,)."""
@@ -68,12 +68,12 @@ class Exchange:
         """PETSc's numbers (m,) if it had only those own unknowns (k,) that are kept, -1 for others;
         and where those of each process begin.
         """
-        chosen = np.flatnonzero(kept)
-        chosen = chosen[np.argsort(self.places[chosen])]
-        starts = np.concatenate([[0], np.cumsum(world().allgather(len(chosen)))])
-        own = np.full(len(self.owned), -1.0)
-        own[chosen] = starts[world().rank] + np.arange(len(chosen))
-        return self.copied(own).astype(np.int64), starts
+        indices = np.flatnonzero(kept)
+        indices = indices[np.argsort(self.places[indices])]
+        starts = np.concatenate([[0], np.cumsum(world().allgather(len(indices)))])
+        new_numbers = np.full(len(self.owned), -1.0)
+        new_numbers[indices] = starts[world().rank] + np.arange(len(indices))
+        return self.copied(new_numbers).astype(np.int64), starts
 
     def _back(self, x: Array, mode: Any) -> Array:
         self.copies.array[:] = x
@@ -86,23 +86,23 @@ class Exchange:
         """A new vector of PETSc's with these own values (k,): whoever asks destroys it, for Python
         cannot tell when the other processes are done with it.
         """
-        found = self.vector.duplicate()
-        found.array[self.places] = own
-        return found
+        vector = self.vector.duplicate()
+        vector.array[self.places] = own
+        return vector
 
 
 def total(values: Array) -> Array:
     """Sums over processes."""
-    found = np.empty_like(values)
-    world().Allreduce(np.ascontiguousarray(values), found)
-    return found
+    sums = np.empty_like(values)
+    world().Allreduce(np.ascontiguousarray(values), sums)
+    return sums
 
 
 def largest(value: float) -> float:
     """The largest number of any process; nan where one is."""
-    found = np.empty(2)
-    world().Allreduce(np.array([value, float(np.isnan(value))]), found, _maximum())
-    return float("nan") if found[1] else float(found[0])
+    result = np.empty(2)
+    world().Allreduce(np.array([value, float(np.isnan(value))]), result, _maximum())
+    return float("nan") if result[1] else float(result[0])
 
 
 def _maximum() -> Any:

@@ -40,14 +40,14 @@ def linear_solver(system: System, linear: Linear) -> tuple[LinearSolver, Callabl
     multigrid cannot be used.
     """
     groups = internal(system.assembler)
-    found, note = _of_rest(system, linear, system.size - sum(g.size for g in groups))
-    return (Condensing(found, groups) if groups else found), note
+    solver, note = _of_rest(system, linear, system.size - sum(g.size for g in groups))
+    return (Condensing(solver, groups) if groups else solver), note
 
 
 def internal(assembler: Assembler) -> tuple[Integers, ...]:
     """Numbers (n, k) of the internal unknowns of each block that has some."""
-    found = [b.internal.values() for b in assembler.blocks if b.internal]
-    return tuple(np.stack(list(numbers), axis=1) for numbers in found)
+    groups = [b.internal.values() for b in assembler.blocks if b.internal]
+    return tuple(np.stack(list(numbers), axis=1) for numbers in groups)
 
 
 def _of_rest(system: System, linear: Linear, count: int) -> tuple[LinearSolver, Callable[[], str]]:
@@ -98,13 +98,13 @@ def nodal_modes(system: System) -> Modes | None:
         return None
     if len(names) > 1 and not is_vector(names, system.mesh.dimension):
         return None
-    kept: Flags = np.ones(system.size, dtype=bool)
+    external: Flags = np.ones(system.size, dtype=bool)
     for name in inner:
-        kept[layout.part(name)] = False
-    rank = np.cumsum(kept) - 1
+        external[layout.part(name)] = False
+    rank = np.cumsum(external) - 1
     numbers = np.stack([nodal[name] for name in names], axis=1)
-    there = (numbers >= 0).all(axis=1)
-    if numbers[there].size != kept.sum():
+    complete = (numbers >= 0).all(axis=1)
+    if numbers[complete].size != external.sum():
         return None
-    near = motions(system.mesh.points[there], names)
-    return Modes(rank[numbers[there]].ravel(), len(names), near)
+    nullspace = motions(system.mesh.points[complete], names)
+    return Modes(rank[numbers[complete]].ravel(), len(names), nullspace)

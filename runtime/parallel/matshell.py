@@ -72,17 +72,17 @@ class Shell:
         times.kernels += time.perf_counter() - began
         return r
 
-    def mult(self, _: Any, given: Any, found: Any) -> None:
+    def mult(self, _: Any, source: Any, target: Any) -> None:
         """PETSc's call: a product, with ones for prescribed unknowns."""
-        places = self.exchange.places
-        x = self.exchange.local(given)
+        positions = self.exchange.places
+        x = self.exchange.local(source)
         x[self.problem.fixed] = 0.0
         y = self.exchange.added(self.local.times(x))
-        found.array[places] = np.where(self.held, given.array_r[places], y)
+        target.array[positions] = np.where(self.held, source.array_r[positions], y)
 
-    def getDiagonal(self, _: Any, found: Any) -> None:
+    def getDiagonal(self, _: Any, target: Any) -> None:
         """PETSc's call."""
-        found.array[self.exchange.places] = np.where(self.held, 1.0, self.own)
+        target.array[self.exchange.places] = np.where(self.held, 1.0, self.own)
 
     def diagonal(self) -> Array:
         """Magnitudes of the diagonal of K, own rows, (k,)."""
@@ -90,9 +90,9 @@ class Shell:
 
     def times(self, x: Array) -> Array:
         """K times own values x, (k,): own rows, (k,)."""
-        found = self.exchange.vector.duplicate()
-        self.matrix.mult(self.exchange.to_petsc(x), found)
-        return np.array(found.array_r[self.exchange.places])
+        product = self.exchange.vector.duplicate()
+        self.matrix.mult(self.exchange.to_petsc(x), product)
+        return np.array(product.array_r[self.exchange.places])
 
     def times_magnitudes(self, x: Array) -> Array:
         """A bound of |K| times own values x, (k,), at least 0: own rows, (k,)."""
@@ -149,23 +149,23 @@ class Shell:
     def _lower(self, near: Any) -> tuple[Any, Any]:
         """The matrix at the lower order, and the interpolation from there."""
         exchange, levels, free = self.exchange, self.levels, self.local.ties.free
-        numbers, chosen = self._numbers()
-        rows, sizes = levels.unknowns[0], (len(chosen), int(world().allreduce(len(chosen))))
+        numbers, local = self._numbers()
+        rows, sizes = levels.unknowns[0], (len(local), int(world().allreduce(len(local))))
         owned = np.zeros(len(exchange.numbers), dtype=bool)
         owned[exchange.owned] = True
-        kept = owned[rows] & free[rows]
-        step = coo_array(alone.without(levels.steps[0], kept) @ self.local.ties.follows[1].matrix)
-        places = exchange.numbers[rows[step.row]], numbers[step.col]
-        P = _matrix(places, step.data, (exchange.vector.getSizes(), sizes), 1)
+        mask = owned[rows] & free[rows]
+        step = coo_array(alone.without(levels.steps[0], mask) @ self.local.ties.follows[1].matrix)
+        indices = exchange.numbers[rows[step.row]], numbers[step.col]
+        P = _matrix(indices, step.data, (exchange.vector.getSizes(), sizes), 1)
         lower = coo_array(self.local.lower)
         typical = float(np.abs(lower.diagonal()).mean()) if lower.shape[0] else 1.0
-        own = exchange.owned[chosen]
-        ones = numbers[np.isin(levels.unknowns[1], own[~free[own]])]
+        owned_lower = exchange.owned[local]
+        ones = numbers[np.isin(levels.unknowns[1], owned_lower[~free[owned_lower]])]
         entries = np.append(numbers[lower.row], ones), np.append(numbers[lower.col], ones)
         values = np.append(lower.data, np.full(len(ones), typical))
         A = _matrix(entries, values, (sizes, sizes), levels.components if near else 1)
         if near is not None:
-            A.setNearNullSpace(self._motions(A, near, chosen))
+            A.setNearNullSpace(self._motions(A, near, local))
         return A, P
 
     def _numbers(self) -> tuple[Integers, Integers]:
@@ -173,28 +173,28 @@ class Shell:
         unknowns, in that order.
         """
         exchange, lower = self.exchange, self.levels.unknowns[1]
-        kept = np.isin(exchange.owned, lower)
-        chosen = np.flatnonzero(kept)
-        return exchange.renumbered(kept)[0][lower], chosen[np.argsort(exchange.places[chosen])]
+        mask = np.isin(exchange.owned, lower)
+        local = np.flatnonzero(mask)
+        return exchange.renumbered(mask)[0][lower], local[np.argsort(exchange.places[local])]
 
     def _motions(self, A: Any, near: Any, chosen: Integers) -> Any:
         """The motions at the nodes of the lower level, made orthogonal."""
-        found: list[Any] = []
+        vectors: list[Any] = []
         for vector in near.getVecs():
-            here = A.createVecRight()
-            here.array[:] = vector.array_r[self.exchange.places[chosen]]
-            for other in found:
-                here.axpy(-here.dot(other), other)
-            here.normalize()
-            found.append(here)
-        return petsc().NullSpace().create(vectors=found, comm=world())
+            level_vector = A.createVecRight()
+            level_vector.array[:] = vector.array_r[self.exchange.places[chosen]]
+            for other in vectors:
+                level_vector.axpy(-level_vector.dot(other), other)
+            level_vector.normalize()
+            vectors.append(level_vector)
+        return petsc().NullSpace().create(vectors=vectors, comm=world())
 
 
 def _matrix(places: tuple[Integers, Integers], values: Array, sizes: Any, block: int) -> Any:
     """Of entries at PETSc's rows and columns, sums where there are several."""
-    found = petsc().Mat().create(comm=world())
-    found.setSizes(sizes, block)
-    found.setType("aij")
-    found.setPreallocationCOO(*(part.astype(petsc().IntType) for part in places))
-    found.setValuesCOO(values, petsc().InsertMode.INSERT_VALUES)
-    return found
+    matrix = petsc().Mat().create(comm=world())
+    matrix.setSizes(sizes, block)
+    matrix.setType("aij")
+    matrix.setPreallocationCOO(*(part.astype(petsc().IntType) for part in places))
+    matrix.setValuesCOO(values, petsc().InsertMode.INSERT_VALUES)
+    return matrix

@@ -72,8 +72,8 @@ class Processes(Share):
     def whole_forces(self, forces: Array) -> Array:
         """See `Share`."""
         part = self.team.part
-        own = self.team.exchange.added(forces)
-        return _gathered(own, part.unknowns[part.owned], self._whole.size)
+        owned = self.team.exchange.added(forces)
+        return _gathered(owned, part.unknowns[part.owned], self._whole.size)
 
     def added(self, x: Array) -> Array:
         """See `Share`."""
@@ -101,7 +101,7 @@ class Processes(Share):
     ) -> tuple[Array, Array]:
         """See `Share`."""
         free = self.free(problem)
-        rising = concave(problem, K, self.added, lambda here: bool(largest(float(here))))
+        rising = concave(problem, K, self.added, lambda flag: bool(largest(float(flag))))
         natural = int((free.gather(rising.astype(np.float64)) > 0.0).sum())
         negative = total(np.array([natural + internal_negative(problem, K)]))
         return Pencil(free, K, M).lowest(count, int(negative[0]))
@@ -157,35 +157,37 @@ class Parts(Processes):
 
     def norm(self, x: Array) -> float:
         """See `Share`."""
-        own = x[self.team.part.owned]
-        return float(np.sqrt(total(np.array([own @ own]))[0]))
+        owned = x[self.team.part.owned]
+        return float(np.sqrt(total(np.array([owned @ owned]))[0]))
 
     def summed(self, values: Array, numbers: Integers) -> float:
         """See `Share`."""
-        own: Flags = np.zeros(len(values), dtype=bool)
-        own[self.team.part.owned] = True
-        return float(total(np.array([values[numbers[own[numbers]]].sum()]))[0])
+        is_owned: Flags = np.zeros(len(values), dtype=bool)
+        is_owned[self.team.part.owned] = True
+        return float(total(np.array([values[numbers[is_owned[numbers]]].sum()]))[0])
 
     def found_each(self, values: list[T | None]) -> list[T | None]:
         """See `Share`."""
-        told = zip(*world().allgather(values), strict=True)
-        return [next((v for v in row if v is not None), None) for row in told]
+        by_process = zip(*world().allgather(values), strict=True)
+        return [next((v for v in row if v is not None), None) for row in by_process]
 
     def at_all_nodes(self, values: Array) -> Array:
         """See `Share`."""
         piece = self.team.part.system.mesh.piece
         assert piece is not None
-        told = world().allgather((piece.numbers, values))
-        numbers, place = np.unique(np.concatenate([n for n, _ in told]), return_inverse=True)
-        every, found = np.concatenate([v for _, v in told]), np.full(len(numbers), np.nan)
-        known = ~np.isnan(every)
-        found[place[known]] = every[known]
-        return found
+        by_process = world().allgather((piece.numbers, values))
+        numbers, inverse = np.unique(
+            np.concatenate([n for n, _ in by_process]), return_inverse=True
+        )
+        every, result = np.concatenate([v for _, v in by_process]), np.full(len(numbers), np.nan)
+        mask = ~np.isnan(every)
+        result[inverse[mask]] = every[mask]
+        return result
 
 
 def _gathered(values: Array, places: Integers, count: int) -> Array:
     """The array (..., count) of which each process has `values` at its own `places`."""
     flat = values.reshape(-1, values.shape[-1]) if values.ndim > 1 else values[None]
-    found = np.zeros((len(flat), count))
-    found[:, places] = flat
-    return np.asarray(total(found).reshape(*values.shape[:-1], count))
+    result = np.zeros((len(flat), count))
+    result[:, places] = flat
+    return np.asarray(total(result).reshape(*values.shape[:-1], count))

@@ -71,16 +71,16 @@ class Cells:
         first = 0
         main = [system.blocks[name] for name in main_blocks(system)]
         for kind in dict.fromkeys(block.kind for block in main):
-            there = [block for block in main if block.kind == kind]
-            found, place = there[0].nodes, np.arange(len(there[0].nodes))
-            if len(there) > 1:
-                every = np.concatenate([block.nodes for block in there])
-                found, place = np.unique(every, axis=0, return_inverse=True)
-            ends = np.cumsum([len(block.nodes) for block in there])[:-1]
-            parts = np.split(place.ravel() + first, ends)
-            rows |= {block.name: part for block, part in zip(there, parts, strict=True)}
-            nodes.append(found)
-            first += len(found)
+            blocks = [block for block in main if block.kind == kind]
+            unique, inverse = blocks[0].nodes, np.arange(len(blocks[0].nodes))
+            if len(blocks) > 1:
+                every = np.concatenate([block.nodes for block in blocks])
+                unique, inverse = np.unique(every, axis=0, return_inverse=True)
+            bounds = np.cumsum([len(block.nodes) for block in blocks])[:-1]
+            parts = np.split(inverse.ravel() + first, bounds)
+            rows |= {block.name: part for block, part in zip(blocks, parts, strict=True)}
+            nodes.append(unique)
+            first += len(unique)
         return cls((*nodes,), rows)
 
     @property
@@ -94,9 +94,9 @@ class Cells:
         A face has as many nodes as there are dimensions, at least.
         """
         counts = np.concatenate([np.full(len(nodes), nodes.shape[1]) for nodes in self.nodes])
-        ends = np.concatenate([[0], np.cumsum(counts)])
+        indptr = np.concatenate([[0], np.cumsum(counts)])
         columns = np.concatenate([nodes.ravel() for nodes in self.nodes])
-        incidence = csr_array((np.ones(len(columns)), columns, ends))
+        incidence = csr_array((np.ones(len(columns)), columns, indptr))
         shared = csr_array(incidence[part] @ incidence.T)
         shared.data[shared.data < dimension] = 0.0
         shared.eliminate_zeros()
@@ -107,19 +107,19 @@ def partition(system: System, cells: Cells, main: Integers, processes: int) -> P
     """The whole partition from the process of each cell, `main`."""
     elements = {name: main[rows] for name, rows in cells.rows.items()}
     node = _node_owners(system, elements, processes)
-    places = nodes_of_unknowns(system)
+    node_of_unknown = nodes_of_unknowns(system)
     for block in system.assembler.blocks:
         if block.name not in elements:
             page = system.blocks.get(block.name)
             stands = page is not None and page.nodes.shape[1] > 0
-            at = page.nodes[:, 0] if page and stands else places[block.dofs[:, 0]]
+            at = page.nodes[:, 0] if page and stands else node_of_unknown[block.dofs[:, 0]]
             elements[block.name] = node[at]
-    owner = np.where(places >= 0, node[places], 0)
-    loose = places < 0  # unknowns of elements: with the first element that has them
+    owner = np.where(node_of_unknown >= 0, node[node_of_unknown], 0)
+    without_node = node_of_unknown < 0  # unknowns of elements: with the first element that has them
     for block in reversed(system.assembler.blocks):
-        rows, columns = np.nonzero(loose[block.dofs])
+        rows, columns = np.nonzero(without_node[block.dofs])
         owner[block.dofs[rows, columns]] = elements[block.name][rows]
-    order, interleaved = numbered(system, owner, places)
+    order, interleaved = numbered(system, owner, node_of_unknown)
     numbers = np.empty(len(order), dtype=np.int64)
     numbers[order] = np.arange(len(order))
     starts = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=processes))])
@@ -140,11 +140,11 @@ def _node_owners(system: System, elements: dict[str, Integers], processes: int) 
 
 def nodes_of_unknowns(system: System) -> Integers:
     """Node (n,) of each unknown, -1 for those that have none."""
-    places = np.full(system.size, -1)
+    node_of_unknown = np.full(system.size, -1)
     for numbers in system.numbering.nodal.values():
-        there = np.flatnonzero(numbers >= 0)
-        places[numbers[there]] = there
-    return places
+        nodes = np.flatnonzero(numbers >= 0)
+        node_of_unknown[numbers[nodes]] = nodes
+    return node_of_unknown
 
 
 def numbered(system: System, owner: Integers, places: Integers) -> tuple[Integers, int]:
@@ -156,15 +156,15 @@ def numbered(system: System, owner: Integers, places: Integers) -> tuple[Integer
     present: list[Flags] = [numbers >= 0 for numbers in nodal]
     group = np.full(system.size, len(nodal))
     kind = np.zeros(system.size, dtype=np.int64)
-    for k, (numbers, there) in enumerate(zip(nodal, present, strict=True)):
-        group[numbers[there]] = next(
-            j for j, other in enumerate(present) if np.array_equal(other, there)
+    for k, (numbers, mask) in enumerate(zip(nodal, present, strict=True)):
+        group[numbers[mask]] = next(
+            j for j, other in enumerate(present) if np.array_equal(other, mask)
         )
-        kind[numbers[there]] = k
+        kind[numbers[mask]] = k
     order = np.lexsort((kind, places, group, owner))
     for inner in internal(system.assembler):
         group[inner] = 0  # condensed before PETSc sees them
-    alike = not group.any() and all(np.array_equal(there, present[0]) for there in present)
+    alike = not group.any() and all(np.array_equal(mask, present[0]) for mask in present)
     return order, len(nodal) if alike else 1
 
 
@@ -195,7 +195,7 @@ def part_of(system: System, partition: Partition, process: int) -> Part:
     local[unknowns] = np.arange(len(unknowns))
     numbering = _numbering(system.numbering, local, elements)
     blocks = [_elements(b, local, elements[b.name]) for b in system.assembler.blocks]
-    found = replace(
+    local_system = replace(
         system,
         numbering=numbering,
         assembler=Assembler.build(len(unknowns), blocks),
@@ -203,7 +203,7 @@ def part_of(system: System, partition: Partition, process: int) -> Part:
         implied=tuple(_implied(force, numbering) for force in system.implied),
         whole=system,
     )
-    return Part(found, unknowns, elements, np.flatnonzero(owners[unknowns] == process))
+    return Part(local_system, unknowns, elements, np.flatnonzero(owners[unknowns] == process))
 
 
 def _numbering(whole: Numbering, local: Integers, elements: dict[str, Integers]) -> Numbering:
@@ -238,8 +238,8 @@ def _page(block: Block, rows: Integers) -> Block:
 
 
 def _implied(force: Force, numbering: Numbering) -> Force:
-    here = (numbering.nodal[force.names[0]][force.nodes] >= 0).all(axis=1)
-    return replace(force, nodes=force.nodes[here])
+    mask = (numbering.nodal[force.names[0]][force.nodes] >= 0).all(axis=1)
+    return replace(force, nodes=force.nodes[mask])
 
 
 def _chosen(values: Array | None, rows: Integers) -> Array | None:
@@ -253,9 +253,9 @@ def part_here(system: System, piece: Piece) -> tuple[Part, Exchange, int]:
     """
     _require_possible(system)
     comm = world()
-    own, shared = _owned(system, piece), _for_all(system)
-    order, interleaved = numbered(system, np.where(own, 0, 1), nodes_of_unknowns(system))
-    count = int(own.sum())
+    is_owned, shared = _owned(system, piece), _for_all(system)
+    order, interleaved = numbered(system, np.where(is_owned, 0, 1), nodes_of_unknowns(system))
+    count = int(is_owned.sum())
     starts = np.concatenate([[0], np.cumsum(comm.allgather(count))])
     numbers = np.full(system.size, -1)
     numbers[order[:count]] = starts[comm.rank] + np.arange(count)
@@ -265,7 +265,7 @@ def part_here(system: System, piece: Piece) -> tuple[Part, Exchange, int]:
     rows = {name: np.arange(len(block.nodes)) for name, block in system.blocks.items()}
     for block in system.assembler.blocks:
         rows.setdefault(block.name, np.arange(len(block.dofs)))
-    part = Part(system, np.arange(system.size), rows, np.flatnonzero(own))
+    part = Part(system, np.arange(system.size), rows, np.flatnonzero(is_owned))
     exchange = Exchange.of(numbers, part.owned, starts)
     return part, exchange, min(comm.allgather(interleaved))
 
@@ -280,16 +280,16 @@ def _require_possible(system: System) -> None:
 
 
 def _owned(system: System, piece: Piece) -> Flags:
-    """(n,): whether an unknown is this process's own: no process before it has the unknown."""
-    own: Flags = np.ones(system.size, dtype=bool)
+    """(n,): whether an unknown is this process's is_owned: no process before it has the unknown."""
+    is_owned: Flags = np.ones(system.size, dtype=bool)
     for numbers in system.numbering.nodal.values():
-        for process, there in piece.told(numbers >= 0).items():
+        for process, flags in piece.told(numbers >= 0).items():
             if process < world().rank:
-                both = numbers[piece.shared[process][there]]
-                own[both[both >= 0]] = False
+                both = numbers[piece.shared[process][flags]]
+                is_owned[both[both >= 0]] = False
     if world().rank:
-        own[_for_all(system)] = False
-    return own
+        is_owned[_for_all(system)] = False
+    return is_owned
 
 
 def _for_all(system: System) -> Integers:
@@ -302,9 +302,9 @@ def _for_all(system: System) -> Integers:
 
 def _ask(numbers: Array | Integers, nodal: Integers, piece: Piece, name: str) -> None:
     """Put PETSc's numbers of an unknown at nodes of others into `numbers`."""
-    here = np.where(nodal >= 0, numbers[nodal], -1)
-    for process, theirs in piece.told(here).items():
-        mine = nodal[piece.shared[process]]
-        found = (mine >= 0) & (theirs >= 0)
-        numbers[mine[found]] = theirs[found]
+    local_numbers = np.where(nodal >= 0, numbers[nodal], -1)
+    for process, other_numbers in piece.told(local_numbers).items():
+        unknowns = nodal[piece.shared[process]]
+        mask = (unknowns >= 0) & (other_numbers >= 0)
+        numbers[unknowns[mask]] = other_numbers[mask]
     assert (numbers[nodal[nodal >= 0]] >= 0).all(), name

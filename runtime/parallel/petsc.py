@@ -76,8 +76,8 @@ class Petsc:
 
     def _team(self, part: Part, exchange: Exchange, interleaved: int) -> Team:
         outer = Outer.of(exchange, part.system.assembler)
-        near = _rigid_motions(part, interleaved, outer)
-        solver = Solver(self.options, near, _fields(part, outer), self.times)
+        nullspace = _rigid_motions(part, interleaved, outer)
+        solver = Solver(self.options, nullspace, _fields(part, outer), self.times)
         return Team(part, exchange, outer, interleaved, solver)
 
     def _order(self, system: System) -> int:
@@ -117,22 +117,22 @@ def _cut(system: System, cells: Cells) -> Integers:
 
 def _rigid_motions(part: Part, interleaved: int, outer: Outer) -> Any:
     """Rigid-body motions for multigrid, where the only unknowns are displacements; else None."""
-    mesh, own = part.system.mesh, outer.owned
-    parts = _spans(part, own)
+    mesh, owned = part.system.mesh, outer.owned
+    parts = _spans(part, owned)
     stems = {name.rpartition("_")[0] for name in parts}
     axes = tuple(name.rpartition("_")[2] for name in parts)
     if interleaved < 2 or len(stems) > 1 or axes != _AXES[: mesh.dimension]:
         return None
-    places = np.empty(len(own))
-    for axis, (name, chosen) in enumerate(parts.items()):
+    owned_coordinates = np.empty(len(owned))
+    for axis, (name, mask) in enumerate(parts.items()):
         numbers = part.system.numbering.nodal[name]
-        there = np.flatnonzero(numbers >= 0)
+        nodes = np.flatnonzero(numbers >= 0)
         local = np.empty(part.system.size)
-        local[numbers[there]] = mesh.points[there, axis]
-        places[chosen] = local[own[chosen]]
-    coordinates = outer.exchange.to_petsc(places)
-    coordinates.setBlockSize(mesh.dimension)
-    return petsc().NullSpace().createRigidBody(coordinates)
+        local[numbers[nodes]] = mesh.points[nodes, axis]
+        owned_coordinates[mask] = local[owned[mask]]
+    vector = outer.exchange.to_petsc(owned_coordinates)
+    vector.setBlockSize(mesh.dimension)
+    return petsc().NullSpace().createRigidBody(vector)
 
 
 def _spans(part: Part, own: Integers) -> dict[str, Flags]:
@@ -145,9 +145,9 @@ def _spans(part: Part, own: Integers) -> dict[str, Flags]:
 
 def _fields(part: Part, outer: Outer) -> dict[str, Integers]:
     """Field -> where its own unknowns stand in this process's piece; displacements are one."""
-    found: dict[str, list[Integers]] = {}
-    for name, chosen in _spans(part, outer.owned).items():
+    fields: dict[str, list[Integers]] = {}
+    for name, mask in _spans(part, outer.owned).items():
         stem, _, axis = name.rpartition("_")
         label = stem if stem and axis in (*_AXES, "r") else name
-        found.setdefault(label, []).append(outer.exchange.places[chosen])
-    return {label: np.sort(np.concatenate(places)) for label, places in found.items()}
+        fields.setdefault(label, []).append(outer.exchange.places[mask])
+    return {label: np.sort(np.concatenate(positions)) for label, positions in fields.items()}

@@ -61,24 +61,26 @@ class Tangent:
     ) -> Tangent:
         """An empty matrix; `fixed` are local numbers of prescribed unknowns."""
         PETSc = petsc()
-        there = np.full(len(exchange.numbers), -1, dtype=PETSc.IntType)
-        there[outer.kept] = outer.exchange.numbers
-        own = there[outer.owned]
-        there[fixed] = -1
+        petsc_numbers = np.full(len(exchange.numbers), -1, dtype=PETSc.IntType)
+        petsc_numbers[outer.kept] = outer.exchange.numbers
+        owned_numbers = petsc_numbers[outer.owned]
+        petsc_numbers[fixed] = -1
         columns = {b.name: Columns.of(b) for b in assembler.blocks if b.internal}
         maps = [
-            there[b.dofs[:, columns[b.name].outer] if b.internal else b.dofs]
+            petsc_numbers[b.dofs[:, columns[b.name].outer] if b.internal else b.dofs]
             for b in assembler.blocks
         ]
-        rows = np.concatenate([*(np.repeat(m, m.shape[1], axis=1).ravel() for m in maps), own])
-        across = np.concatenate([*(np.tile(m, m.shape[1]).ravel() for m in maps), own])
+        rows = np.concatenate(
+            [*(np.repeat(m, m.shape[1], axis=1).ravel() for m in maps), owned_numbers]
+        )
+        across = np.concatenate([*(np.tile(m, m.shape[1]).ravel() for m in maps), owned_numbers])
         matrix = PETSc.Mat().create(comm=world())
         sizes = outer.exchange.vector.getSizes()
         matrix.setSizes((sizes, sizes), block)
         matrix.setType("aij")
         matrix.setPreallocationCOO(rows, across)
         values = np.zeros(len(rows))
-        values[len(rows) - len(own) :] = np.isin(outer.owned, fixed)
+        values[len(rows) - len(owned_numbers) :] = np.isin(outer.owned, fixed)
         return cls(matrix, values, fixed, assembler.structure, columns, exchange, outer)
 
     def serves(self, assembler: Assembler, fixed: Integers) -> bool:
@@ -115,14 +117,14 @@ class Tangent:
         free[self.fixed] = False
         moved = bool(defect.any())
         self.pieces = []
-        for piece, place in self.places(assembler):
+        for piece, entries in self.places(assembler):
             if not len(piece.dofs):
                 continue
             if piece.name not in parameters:
-                place[:] = 0.0
+                entries[:] = 0.0
                 continue
             local, tangents = piece.tangent(x, parameters[piece.name])
-            place[:] = self._condensed(piece, tangents, free).ravel()
+            entries[:] = self._condensed(piece, tangents, free).ravel()
             np.add.at(diagonal, piece.dofs, np.einsum("nii->ni", tangents))
             if moved:
                 local = local - np.einsum("nij,nj->ni", tangents, defect[piece.dofs])
@@ -139,9 +141,11 @@ class Tangent:
         columns = self.columns.get(piece.name)
         if columns is None:
             return K
-        found = Piece.of(columns, piece.dofs, K, free)
-        self.pieces.append(found)
-        return np.asarray(K[:, columns.outer][:, :, columns.outer] - found.back @ found.slopes)
+        condensed = Piece.of(columns, piece.dofs, K, free)
+        self.pieces.append(condensed)
+        return np.asarray(
+            K[:, columns.outer][:, :, columns.outer] - condensed.back @ condensed.slopes
+        )
 
     def solved(self, solver: Solver, r: Array) -> Array:
         """Local x (m,) of K x = r, own values (k,).  Raises SingularMatrix on all processes."""
@@ -150,14 +154,14 @@ class Tangent:
         require_eliminated(self.pieces, self.exchange)
         exchange, right = self.exchange, np.zeros(len(self.exchange.numbers))
         right[exchange.owned] = r
-        given = right.copy()
+        original = right.copy()
         for piece in self.pieces:
             piece.eliminate(right)
         x = np.zeros(len(right))
         left = exchange.copied(exchange.added(right))
         x[self.outer.kept] = solver.solve(self, left[self.outer.owned])
         for piece in self.pieces:
-            piece.recover(x, given)
+            piece.recover(x, original)
         return x
 
     def diagonal(self) -> Array:
@@ -175,20 +179,20 @@ class Tangent:
         csr = starts, columns, values
         magnitudes = petsc().Mat().createAIJ(self.matrix.getSizes(), csr=csr, comm=world())
         del starts, columns, values, csr
-        found = self._product(magnitudes, x, np.abs)
+        product = self._product(magnitudes, x, np.abs)
         magnitudes.destroy()  # here and below: PETSc keeps what Python alone lets go
-        return found
+        return product
 
     def _product(self, matrix: Any, x: Array, of: Callable[[Array], Array]) -> Array:
         local = np.zeros(len(self.exchange.numbers))
         local[self.exchange.owned] = x
         rows = self.rows
-        found, given = rows.vector.duplicate(), rows.to_petsc(local[self.outer.owned])
-        matrix.mult(given, found)
+        target, source = rows.vector.duplicate(), rows.to_petsc(local[self.outer.owned])
+        matrix.mult(source, target)
         y = np.zeros(len(local))
-        y[self.outer.owned] = found.array_r[rows.places]
-        found.destroy()
-        given.destroy()
+        y[self.outer.owned] = target.array_r[rows.places]
+        target.destroy()
+        source.destroy()
         if self.columns:
             local = self.exchange.copied(x)
             for piece in self.pieces:
@@ -314,14 +318,16 @@ class Solver:
             self.times.solver += time.perf_counter() - began
         self.times.solves += 1
         self.times.iterations += ksp.getIterationNumber()
-        size, found = x.norm(), tangent.rows.local(x)
+        size, solution = x.norm(), tangent.rows.local(x)
         b.destroy()
         x.destroy()
         if reason < 0 or not np.isfinite(size):
             row = tangent.empty_row()
-            words = f"PETSc's {ksp.getType()} with {ksp.getPC().getType()} failed (reason {reason})"
-            raise SingularMatrix(words, None if row < 0 else row)
-        return found
+            message = (
+                f"PETSc's {ksp.getType()} with {ksp.getPC().getType()} failed (reason {reason})"
+            )
+            raise SingularMatrix(message, None if row < 0 else row)
+        return solution
 
     @property
     def direct(self) -> bool:
@@ -352,8 +358,8 @@ class Solver:
         if pc.getType() == "fieldsplit":
             first = tangent.matrix.getOwnershipRange()[0]
             parts = [
-                (name, PETSc.IS().createGeneral((first + places).astype(PETSc.IntType), world()))
-                for name, places in self.fields.items()
+                (name, PETSc.IS().createGeneral((first + positions).astype(PETSc.IntType), world()))
+                for name, positions in self.fields.items()
             ]
             pc.setFieldSplitIS(*parts)
         return ksp

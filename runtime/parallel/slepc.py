@@ -42,17 +42,17 @@ class DistributedConstraints:
     @classmethod
     def of(cls, problem: Problem, part: Part, exchange: Exchange) -> DistributedConstraints:
         """Of the local part of a problem."""
-        held = np.zeros(problem.assembler.size)
-        held[problem.fixed] = 1.0
+        constrained = np.zeros(problem.assembler.size)
+        constrained[problem.fixed] = 1.0
         for block in problem.assembler.blocks:
             if isinstance(block.kernel, Tie):
-                held[block.dofs[:, 2]] = 1.0
+                constrained[block.dofs[:, 2]] = 1.0
         first = _tied(part, exchange)
-        kept = first.highest(held) == 0.0
-        numbers, starts = first.renumbered(kept)
-        there = np.flatnonzero(numbers >= 0)
-        owned = np.searchsorted(there, first.owned[kept])
-        return cls(len(held), there, Exchange.of(numbers[there], owned, starts))
+        mask = first.highest(constrained) == 0.0
+        numbers, starts = first.renumbered(mask)
+        free = np.flatnonzero(numbers >= 0)
+        owned = np.searchsorted(free, first.owned[mask])
+        return cls(len(constrained), free, Exchange.of(numbers[free], owned, starts))
 
     def gather(self, forces: Array) -> Array:
         """T' f: own sums over all processes of forces (m,) that the elements of each have."""
@@ -67,17 +67,17 @@ class DistributedConstraints:
 
 def _tied(part: Part, exchange: Exchange) -> Exchange:
     """The exchange of a part in which each unknown is the first of those that it is tied to."""
-    whole = part.system.everywhere
-    pairs = [b.dofs[:, :2] for b in whole.assembler.blocks if isinstance(b.kernel, Tie)]
+    global_system = part.system.everywhere
+    pairs = [b.dofs[:, :2] for b in global_system.assembler.blocks if isinstance(b.kernel, Tie)]
     if not pairs:
         return exchange
-    first = _first(np.concatenate(pairs), whole.size)
-    numbers = _all_numbers(whole, part, exchange)
-    own = first[part.unknowns[part.owned]] == part.unknowns[part.owned]
+    first = _first(np.concatenate(pairs), global_system.size)
+    numbers = _all_numbers(global_system, part, exchange)
+    is_master = first[part.unknowns[part.owned]] == part.unknowns[part.owned]
     comm = world()
-    ends = comm.allgather(len(part.owned))
-    starts = np.concatenate([[0], np.cumsum(ends)])
-    return Exchange.of(numbers[first[part.unknowns]], part.owned[own], starts)
+    counts = comm.allgather(len(part.owned))
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    return Exchange.of(numbers[first[part.unknowns]], part.owned[is_master], starts)
 
 
 def _first(pairs: Integers, n: int) -> Integers:
@@ -89,12 +89,12 @@ def _first(pairs: Integers, n: int) -> Integers:
 
 def _all_numbers(whole: System, part: Part, exchange: Exchange) -> Integers:
     """PETSc's number of each unknown of the whole."""
-    found = np.zeros(whole.size, dtype=np.int64)
+    result = np.zeros(whole.size, dtype=np.int64)
     for unknowns, numbers in world().allgather(
         (part.unknowns[part.owned], exchange.numbers[part.owned])
     ):
-        found[unknowns] = numbers
-    return found
+        result[unknowns] = numbers
+    return result
 
 
 _EXACT = 1e-11  # of eigenvalues
@@ -121,13 +121,13 @@ class Pencil:
         ratio = largest(float(np.abs(K[M > 0.0] / M[M > 0.0]).max(initial=0.0)))
         eps, factors = self._shifted(count)
         below(lambda shift: factors.at(eps, shift), self._nearly_singular, ratio, saddle)
-        values, found = _solved(eps, count, "modes")
+        values, vectors = _solved(eps, count, "modes")
         mass, order = eps.getOperators()[1], np.argsort(values.real)[:count]
         modes = np.empty((len(order), self.free.size))
         for mode, k in zip(modes, order, strict=True):
             # once more by the inverse: unknowns without mass follow from the others
-            right, shape = found[k].duplicate(), found[k].duplicate()
-            mass.mult(found[k], right)
+            right, shape = vectors[k].duplicate(), vectors[k].duplicate()
+            mass.mult(vectors[k], right)
             factors.ksp.solve(right, shape)
             mass.mult(shape, right)
             shape.scale(1.0 / np.sqrt(shape.dot(right)))
@@ -141,9 +141,9 @@ class Pencil:
         eps.setProblemType(slepc().EPS.ProblemType.GNHEP)
         eps.setWhichEigenpairs(slepc().EPS.Which.LARGEST_REAL)
         _factorised(eps.getST().getKSP(), "lu")
-        values, found = _solved(eps, count, "buckling factors")
+        values, vectors = _solved(eps, count, "buckling factors")
         factors, order = buckling_factors(values)
-        modes = signed(np.stack([self._local(found[k]) for k in order[:count]]))
+        modes = signed(np.stack([self._local(vectors[k]) for k in order[:count]]))
         sizes = [largest(float(np.abs(mode).max(initial=0.0))) for mode in modes]
         return factors[:count], modes / np.array(sizes)[:, None]
 
@@ -170,12 +170,12 @@ class Pencil:
         PETSc, entries = petsc(), coo_array(symmetric(A))
         numbers = np.full(self.free.size, -1, dtype=PETSc.IntType)
         numbers[self.free.there] = self.exchange.numbers
-        found, sizes = PETSc.Mat().create(comm=world()), self.exchange.vector.getSizes()
-        found.setSizes((sizes, sizes), 1)
-        found.setType("aij")
-        found.setPreallocationCOO(numbers[entries.row], numbers[entries.col])
-        found.setValuesCOO(entries.data, PETSc.InsertMode.INSERT_VALUES)
-        return found
+        matrix, sizes = PETSc.Mat().create(comm=world()), self.exchange.vector.getSizes()
+        matrix.setSizes((sizes, sizes), 1)
+        matrix.setType("aij")
+        matrix.setPreallocationCOO(numbers[entries.row], numbers[entries.col])
+        matrix.setValuesCOO(entries.data, PETSc.InsertMode.INSERT_VALUES)
+        return matrix
 
     def _local(self, vector: Any) -> Array:
         return self.free.spread(np.array(vector.array_r[self.exchange.places]))
@@ -185,8 +185,8 @@ class Pencil:
         b = np.random.default_rng(world().rank).uniform(-1.0, 1.0, len(self.exchange.owned))
         x = self.free.spread(factors.solve(b))
         size = self.free.gather(abs(self.K) @ np.abs(x))
-        most = [largest(float(np.abs(v).max(initial=0.0))) for v in (b, size)]
-        return bool(most[0] <= 1e-11 * most[1])
+        largest_entries = [largest(float(np.abs(v).max(initial=0.0))) for v in (b, size)]
+        return bool(largest_entries[0] <= 1e-11 * largest_entries[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,10 +213,10 @@ class _Factors:
 
     def solve(self, b: Array) -> Array:
         """x of own values b."""
-        given = self.exchange.to_petsc(b)
-        found = given.duplicate()
-        self.ksp.solve(given, found)
-        return np.array(found.array_r[self.exchange.places])
+        source = self.exchange.to_petsc(b)
+        target = source.duplicate()
+        self.ksp.solve(source, target)
+        return np.array(target.array_r[self.exchange.places])
 
 
 def _factorised(ksp: Any, kind: str) -> None:
@@ -229,22 +229,22 @@ def _factorised(ksp: Any, kind: str) -> None:
     pc.setFactorSolverType("mumps")
 
 
-def _solved(eps: Any, count: int, words: str) -> tuple[Array, list[Any]]:
+def _solved(eps: Any, count: int, name: str) -> tuple[Array, list[Any]]:
     """Eigenvalues, complex ones, and vectors.  Raises NoModes, SingularMatrix."""
     eps.setFromOptions()
     try:
         eps.solve()
     except petsc().Error as error:
         raise SingularMatrix(f"no factors: {error}") from None
-    known = eps.getConverged()
-    if known < count:
-        raise NoModes(f"{count} {words}: {known} converged")
-    vectors = [eps.getOperators()[0].createVecRight() for _ in range(known)]
+    n_converged = eps.getConverged()
+    if n_converged < count:
+        raise NoModes(f"{count} {name}: {n_converged} converged")
+    vectors = [eps.getOperators()[0].createVecRight() for _ in range(n_converged)]
     return np.array([eps.getEigenpair(k, v) for k, v in enumerate(vectors)]), vectors
 
 
 def signed(modes: Array) -> Array:
     """Modes (k, m) with the largest entry on any process positive."""
-    found = [world().allgather(float(m[np.abs(m).argmax()]) if len(m) else 0.0) for m in modes]
-    signs = np.array([np.sign(max(of_all, key=abs)) for of_all in found])
+    extremes = [world().allgather(float(m[np.abs(m).argmax()]) if len(m) else 0.0) for m in modes]
+    signs = np.array([np.sign(max(of_all, key=abs)) for of_all in extremes])
     return np.asarray(modes * signs[:, None])

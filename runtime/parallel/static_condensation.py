@@ -42,10 +42,10 @@ class Outer:
         outer: Flags = np.ones(len(exchange.numbers), dtype=bool)
         for numbers in inner:
             outer[numbers] = False
-        kept, own = np.flatnonzero(outer), outer[exchange.owned]
-        numbers, starts = exchange.renumbered(own)
-        owned = (np.cumsum(outer) - 1)[exchange.owned[own]]
-        return cls(kept, Exchange.of(numbers[kept], owned, starts))
+        external, owned_external = np.flatnonzero(outer), outer[exchange.owned]
+        numbers, starts = exchange.renumbered(owned_external)
+        owned = (np.cumsum(outer) - 1)[exchange.owned[owned_external]]
+        return cls(external, Exchange.of(numbers[external], owned, starts))
 
     @property
     def owned(self) -> Integers:

@@ -60,10 +60,10 @@ class Pivots:
         place, a small positive one that of other unknowns. This changes no sign.
         """
         weak = np.zeros(K.shape[0]) if saddle is None else _weak(K, saddle)
-        near = csc_array(K - diags_array(weak)) if weak.any() else K
+        shifted = csc_array(K - diags_array(weak)) if weak.any() else K
         try:
             factors = sparse_linalg.splu(
-                without_zeros(near),
+                without_zeros(shifted),
                 permc_spec="MMD_AT_PLUS_A",
                 diag_pivot_thresh=0.0,
                 options={"SymmetricMode": True},
@@ -73,13 +73,13 @@ class Pivots:
         if not np.array_equal(factors.perm_r, factors.perm_c):
             raise SingularMatrix("a pivot on the diagonal is zero")
         negative = int((factors.U.diagonal() < 0.0).sum())
-        found = cls(factors, negative, K if weak.any() else None)
+        pivots = cls(factors, negative, K if weak.any() else None)
         b = np.random.default_rng(0).uniform(-1.0, 1.0, K.shape[0])
-        x = found.solve(b)
+        x = pivots.solve(b)
         scale = np.asarray(abs(K).sum(axis=1)) * np.abs(x).max(initial=0.0) + np.abs(b)
         if not np.abs(K @ x - b).max(initial=0.0) <= _RESIDUAL * scale.max(initial=0.0):
             raise SingularMatrix("the pivots on the diagonal are too weak")
-        return found
+        return pivots
 
     def solve(self, b: Array) -> Array:
         """x of K x = b, shapes (n,)."""
@@ -94,16 +94,16 @@ def _weak(K: csc_array, saddle: Flags) -> Array:
     """Numbers (n,) that the diagonal of K has too much where it is zero: multipliers get less, and
     displacements beside stresses more.
     """
-    diagonal, found = np.abs(K.diagonal()), np.zeros(K.shape[0])
+    diagonal, result = np.abs(K.diagonal()), np.zeros(K.shape[0])
     squares, strong = csc_array(K.multiply(K)), diagonal > 0.0
-    for chosen, sign in ((saddle, 1.0), (~saddle, -1.0)):
-        known = ~chosen & strong
-        stiff = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=known)
+    for mask, sign in ((saddle, 1.0), (~saddle, -1.0)):
+        strong_rows = ~mask & strong
+        stiff = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=strong_rows)
         pivot = _WEAK * np.asarray(squares @ stiff)
-        small = chosen & (diagonal < pivot)
-        found[small] = sign * pivot[small]
+        small = mask & (diagonal < pivot)
+        result[small] = sign * pivot[small]
         strong &= ~small  # what is left there is rounding
-    return found
+    return result
 
 
 def lowest(
@@ -115,13 +115,13 @@ def lowest(
     without mass, each of which makes an eigenvalue of K negative by nature. Vectors have
     x' M x = 1. Raises NoModes, SingularMatrix.
     """
-    n, held = K.shape[0], M.diagonal() > 0.0
-    heavy = int(held.sum())
+    n, has_mass = K.shape[0], M.diagonal() > 0.0
+    heavy = int(has_mass.sum())
     require_count(count, heavy)
     shift, pivots = below(
         lambda shift: Pivots.of(csc_array(K - shift * M), saddle),
         lambda pivots: _nearly_singular(pivots, K),
-        float(np.abs(K.diagonal()[held] / M.diagonal()[held]).max()),
+        float(np.abs(K.diagonal()[has_mass] / M.diagonal()[has_mass]).max()),
         0 if saddle is None else int(saddle.sum()),
     )
     inverse = sparse_linalg.LinearOperator((n, n), matvec=pivots.solve, dtype=np.float64)
@@ -182,8 +182,8 @@ def below(
     for k in range(_SHIFTS + 1):
         try:
             pivots = pivots_of(shift)
-            near = k == 0 and singular(pivots)
-            if pivots.negative == saddle and not near:
+            nearly_singular = k == 0 and singular(pivots)
+            if pivots.negative == saddle and not nearly_singular:
                 return shift, pivots
             reason = f"{pivots.negative - saddle} eigenvalues below {shift:.3g}"
         except SingularMatrix as error:
@@ -219,10 +219,10 @@ def smallest_factors(K: csc_array, G: csc_array, count: int) -> tuple[Array, Arr
         (n, n), matvec=lambda x: -factors.solve(G @ x), dtype=np.float64
     )
     begin = np.random.default_rng(0).uniform(-1.0, 1.0, n)
-    wanted = min(n - 2, count)
+    n_requested = min(n - 2, count)
     try:
         inverse, vectors = sparse_linalg.eigs(
-            action, wanted, which="LR", v0=begin, ncv=min(n, 3 * wanted + 20)
+            action, n_requested, which="LR", v0=begin, ncv=min(n, 3 * n_requested + 20)
         )
     except sparse_linalg.ArpackError as error:
         raise NoModes(f"{count} buckling factors: {error}") from error
@@ -251,8 +251,8 @@ def nearest_zero(K: csc_array) -> tuple[float, Array]:
     n = K.shape[0]
     if n < _DENSE:
         every, columns = np.linalg.eigh(K.toarray())
-        chosen = int(np.abs(every).argmin())
-        return float(every[chosen]), signed(columns[:, [chosen]].T)[0]
+        index = int(np.abs(every).argmin())
+        return float(every[index]), signed(columns[:, [index]].T)[0]
     shift = 0.0
     try:
         pivots = Pivots.of(K)
@@ -275,10 +275,10 @@ def highest(
 
     begin: a random vector (n,). dot: of two vectors, which may be spread over processes.
     """
-    v, before = begin / np.sqrt(dot(begin, begin)), np.zeros_like(begin)
+    v, previous = begin / np.sqrt(dot(begin, begin)), np.zeros_like(begin)
     alphas, betas = list[float](), list[float]()
     while True:
-        w = apply(v) - (betas[-1] if betas else 0.0) * before
+        w = apply(v) - (betas[-1] if betas else 0.0) * previous
         alphas.append(dot(w, v))
         w -= alphas[-1] * v
         betas.append(float(np.sqrt(dot(w, w))))
@@ -286,7 +286,7 @@ def highest(
         top = float(values[-1])
         if betas[-1] * abs(vectors[-1, -1]) <= accuracy * abs(top):
             return top
-        before, v = v, w / betas[-1]
+        previous, v = v, w / betas[-1]
 
 
 def signed(vectors: Array) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.discretisation import assembly
+from softehl.runtime.discretisation import element_blocks
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.dofmap import DofLayout
 from softehl.runtime.discretisation.element_blocks import ElementBlock
@@ -98,8 +98,8 @@ def test_pieces_of_a_block_add_up_to_it(
     blocks, x = _blocks(rng), rng.normal(size=SIZE)
     assembler = Assembler.build(SIZE, blocks)
     whole = assembler.linearise(x, PARAMETERS)
-    monkeypatch.setattr(assembly, "_PIECE", 9 * 4)  # 4 of the 25 elements at a time
-    monkeypatch.setattr(assembly, "_GROUP", 1)
+    monkeypatch.setattr(element_blocks, "_PIECE", 9 * 4)  # 4 of the 25 elements at a time
+    monkeypatch.setattr(element_blocks, "_GROUP", 1)
     pieces = [piece for piece, _ in blocks[0].pieces(assembler.pattern.scatter[0])]
     assert [len(piece.dofs) for piece in pieces] == [4] * 6 + [1]
     r, K = assembler.linearise(x, PARAMETERS)

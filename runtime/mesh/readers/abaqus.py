@@ -191,9 +191,9 @@ def _fields(text: str) -> list[str]:
 
 
 def _keyword(line: _Line) -> _Keyword:
-    name, *given = _fields(line.text[1:])
+    name, *option_texts = _fields(line.text[1:])
     options = {}
-    for part in given:
+    for part in option_texts:
         key, _, value = part.partition("=")
         options["".join(key.split()).upper()] = value.strip().strip('"')
     return _Keyword("".join(name.split()).upper(), options, line.place)
@@ -265,12 +265,12 @@ class _Model:
                 f"{keyword.place}: *NODE, SYSTEM={keyword.options['SYSTEM']} is not read: {_ADVICE}"
                 ", in x, y, z"
             )
-        known, labels = self.current.nodes, []
+        existing, labels = self.current.nodes, []
         for line in data:
-            first, *given = _fields(line.text)
+            first, *coordinates = _fields(line.text)
             label = _whole(first, line.place)
-            x, y, z = ([_real(text, line.place) for text in given[:3]] + [0.0] * 3)[:3]
-            if known.setdefault(label, (x, y, z)) != (x, y, z):
+            x, y, z = ([_real(text, line.place) for text in coordinates[:3]] + [0.0] * 3)[:3]
+            if existing.setdefault(label, (x, y, z)) != (x, y, z):
                 raise AbaqusError(f"{line.place}: node {label} is given again, at another place")
             labels.append(label)
         self._add("NSET", keyword, labels)
@@ -280,7 +280,7 @@ class _Model:
         family, kind = _kind(keyword)
         if "AX" in keyword.option("TYPE").upper():
             self.rings = keyword.option("TYPE")
-        count, known, labels = len(CELLS[kind].nodes), self.current.elements, []
+        count, existing, labels = len(CELLS[kind].nodes), self.current.elements, []
         numbers: list[int] = []
         for line in data:
             numbers += [_whole(text, line.place) for text in _fields(line.text)]
@@ -293,7 +293,7 @@ class _Model:
                     f"{keyword.options['TYPE']} has {count}"
                 )
             nodes = tuple(nodes[k] for k in _ORDERS.get(kind, range(count)))
-            if known.setdefault(label, (kind, family, nodes)) != (kind, family, nodes):
+            if existing.setdefault(label, (kind, family, nodes)) != (kind, family, nodes):
                 raise AbaqusError(f"{line.place}: element {label} is given again, as another one")
             labels.append(label)
             numbers = []
@@ -307,18 +307,18 @@ class _Model:
     def _add(self, kind: str, keyword: _Keyword, labels: Iterable[int]) -> None:
         """Put new nodes or elements into the set that their keyword names."""
         if keyword.options.get(kind):
-            found = self.current.set(kind, keyword.options[kind], keyword.place)
-            found.members += [("", kind, label) for label in labels]
-            found.internal = False
+            group = self.current.set(kind, keyword.options[kind], keyword.place)
+            group.members += [("", kind, label) for label in labels]
+            group.internal = False
 
     def sets(self, keyword: _Keyword, data: list[_Line]) -> None:
         """*NSET and *ELSET."""
         options, kind = keyword.options, keyword.name
-        found = self.current.set(kind, keyword.option(kind), keyword.place)
-        found.internal &= "INTERNAL" in options
+        group = self.current.set(kind, keyword.option(kind), keyword.place)
+        group.internal &= "INTERNAL" in options
         instance = options.get("INSTANCE", "")
         if kind == "NSET" and options.get("ELSET"):
-            found.members.append((instance, "ELSET", options["ELSET"]))
+            group.members.append((instance, "ELSET", options["ELSET"]))
         for line in data:
             fields = _fields(line.text)
             if "GENERATE" in options:
@@ -329,9 +329,9 @@ class _Model:
                     raise AbaqusError(
                         f"{line.place}: GENERATE in steps of {step}, must be 1 or more"
                     )
-                found.members.append((instance, kind, range(first, last + 1, step)))
+                group.members.append((instance, kind, range(first, last + 1, step)))
             else:
-                found.members += [
+                group.members += [
                     (instance, kind, int(text) if text.isdigit() else text.strip('"'))
                     for text in fields
                     if text
@@ -350,16 +350,16 @@ class _Model:
                 stacklevel=2,
             )
             return
-        found = self.current.surfaces.setdefault(
+        target = self.current.surfaces.setdefault(
             name.upper(), _Surface(name, keyword.place, kind, [], "INTERNAL" in keyword.options)
         )
         for line in data:
             fields = _fields(line.text)
             if kind == "UNION":
-                found.lines += [(text.strip('"'), "") for text in fields]
+                target.lines += [(text.strip('"'), "") for text in fields]
             else:
                 label = fields[1].upper() if len(fields) > 1 and kind == "ELEMENT" else ""
-                found.lines.append((fields[0].strip('"'), label))
+                target.lines.append((fields[0].strip('"'), label))
 
     def part(self, keyword: _Keyword, data: list[_Line]) -> None:
         """*PART."""
@@ -411,9 +411,9 @@ def _kind(keyword: _Keyword) -> tuple[str, str]:
             if not kinds:
                 return family, "line2" if family == "line" else "point1"
             return family, kinds[int(match[1])]
-    known = ", ".join(_TYPES[3][k] for k in ("tet4", "tet10", "wedge6", "hex8", "hex20", "hex27"))
+    allowed = ", ".join(_TYPES[3][k] for k in ("tet4", "tet10", "wedge6", "hex8", "hex20", "hex27"))
     raise AbaqusError(
-        f"{keyword.place}: elements {name} have no cell here; there are {known}, CPS3/4/6/8 and "
+        f"{keyword.place}: elements {name} have no cell here; there are {allowed}, CPS3/4/6/8 and "
         "CPE, CAX, S, M3D likewise, T3D2/3, B31/32 and their variants"
     )
 
@@ -463,7 +463,7 @@ class _Mesh:
             first = len(self.points)
             self.node[key] = number = {label: first + k for k, label in enumerate(scope.nodes)}
             self.points += scope.nodes.values()
-            self.element[key] = own = {}
+            self.element[key] = numbers = {}
             for label, (kind, family, nodes) in scope.elements.items():
                 rows = self.rows.setdefault(kind, [])
                 try:
@@ -472,18 +472,18 @@ class _Mesh:
                     raise AbaqusError(
                         f"element {label} has node {error}, which is not in the file"
                     ) from None
-                own[label] = len(self.cells)
+                numbers[label] = len(self.cells)
                 self.cells.append((kind, len(rows) - 1, family))
 
     def members(self, kind: str, key: str, name: str, seen: tuple[str, ...] = ()) -> list[int]:
         """Nodes or elements of a set of a scope."""
-        found = self.scopes[key].sets.get((kind, name.upper()))
-        if found is None:
+        group = self.scopes[key].sets.get((kind, name.upper()))
+        if group is None:
             raise AbaqusError(f"there is no {kind} {name!r}, which another set or surface names")
         if name.upper() in seen:
             return []
         numbers: list[int] = []
-        for instance, what, member in found.members:
+        for instance, what, member in group.members:
             inside = self.one(what, self.scope(instance, key), member, (*seen, name.upper()))
             if what != kind:
                 inside = [n for e in inside for n in self.rows[self.cells[e][0]][self.cells[e][1]]]
@@ -492,12 +492,12 @@ class _Mesh:
 
     def by_kind(self, numbers: Sequence[int], dimensions: Sequence[int]) -> dict[str, Integers]:
         """Kind -> rows of elements of these dimensions, rising."""
-        found: dict[str, set[int]] = {}
+        members: dict[str, set[int]] = {}
         for number in numbers:
             kind, row, _ = self.cells[number]
             if CELLS[kind].dimension in dimensions:
-                found.setdefault(kind, set()).add(row)
-        return {kind: np.array(sorted(rows)) for kind, rows in found.items()}
+                members.setdefault(kind, set()).add(row)
+        return {kind: np.array(sorted(rows)) for kind, rows in members.items()}
 
     def scope(self, instance: str, key: str) -> str:
         """The scope of an instance, else the same."""
@@ -509,19 +509,19 @@ class _Mesh:
         self, kind: str, key: str, member: int | range | str, seen: tuple[str, ...] = ()
     ) -> list[int]:
         """Nodes or elements that are meant by a number, a range or a name in a scope."""
-        known = self.node[key] if kind == "NSET" else self.element[key]
+        labels = self.node[key] if kind == "NSET" else self.element[key]
         if isinstance(member, range):
-            few = member if len(member) <= len(known) else (n for n in known if n in member)
-            return [known[n] for n in few if n in known]
+            few = member if len(member) <= len(labels) else (n for n in labels if n in member)
+            return [labels[n] for n in few if n in labels]
         if isinstance(member, int):
-            if member not in known:
+            if member not in labels:
                 what = "node" if kind == "NSET" else "element"
                 raise AbaqusError(f"a set or surface has {what} {member}, which is not in the file")
-            return [known[member]]
-        instance, dot, rest = member.rpartition(".")
+            return [labels[member]]
+        instance, dot, label = member.rpartition(".")
         plain = (kind, member.upper()) in self.scopes[key].sets
         if dot and not plain and instance.upper() in self.scopes:
-            return self.one(kind, instance.upper(), int(rest) if rest.isdigit() else rest)
+            return self.one(kind, instance.upper(), int(label) if label.isdigit() else label)
         return self.members(kind, key, member, seen)
 
     def side(self, key: str, surface: _Surface) -> Side:
@@ -617,20 +617,20 @@ def read(path: Path) -> Content:
         if len(model.instances) > 1 and key and scope.elements:
             numbers = list(mesh.element[key].values())
             groups.add(scope.name, "", mesh.by_kind(numbers, [top]))
-        for (kind, upper), found in scope.sets.items():
-            if found.internal:
+        for (kind, upper), group in scope.sets.items():
+            if group.internal:
                 continue
             numbers = mesh.members(kind, key, upper)
             if kind == "NSET":
                 points = np.unique(np.array(numbers, dtype=np.int64))
-                nodes.add(found.name, scope.name, {"point1": points[:, None]})
+                nodes.add(group.name, scope.name, {"point1": points[:, None]})
                 continue
-            groups.add(found.name, scope.name, mesh.by_kind(numbers, [top]))
+            groups.add(group.name, scope.name, mesh.by_kind(numbers, [top]))
             for dimension in range(top - 1, -1, -1):
                 lower = mesh.by_kind(numbers, [dimension])
                 if lower:
                     members = {k: cells[k][rows] for k, rows in lower.items()}
-                    faces.add(found.name, scope.name, members)
+                    faces.add(group.name, scope.name, members)
                     break
         for surface in scope.surfaces.values():
             if not surface.internal:
@@ -639,11 +639,11 @@ def read(path: Path) -> Content:
                 surfaces.add(surface.name, scope.name, side)
     sides = surfaces.named()
     for names, ending in ((faces, ".elements"), (nodes, ".nodes")):
-        known = {name.upper(): name for name in sides}
+        names_by_upper = {name.upper(): name for name in sides}
         for name, side_too in names.named().items():
-            if name.upper() not in known:
+            if name.upper() not in names_by_upper:
                 sides[name] = side_too
-            elif not np.array_equal(_nodes(sides[known[name.upper()]]), _nodes(side_too)):
+            elif not np.array_equal(_nodes(sides[names_by_upper[name.upper()]]), _nodes(side_too)):
                 sides[name + ending] = side_too
     return Content(np.array(mesh.points), cells, groups.named(), sides=sides)
 
@@ -702,10 +702,10 @@ def text(
         numbers = [n for kind, rows in members.items() for n in (rows + first[kind]).tolist()]
         lines += [f"*ELSET, ELSET={_quoted(name, 'ELSET', names)}", *_rows(numbers)]
     for name, faces in sides.items():
-        labels, rest = _labels(cells, faces, first, types)
+        labels, unlabelled = _labels(cells, faces, first, types)
         if labels:
             lines += [f"*SURFACE, NAME={_quoted(name, 'SURFACE', names)}, TYPE=ELEMENT", *labels]
-        for kind, nodes in rest.items():
+        for kind, nodes in unlabelled.items():
             if kind == "point1":
                 lines += [f"*NSET, NSET={_quoted(name, 'NSET', names)}"]
                 lines += _rows((nodes.ravel() + 1).tolist())
@@ -747,7 +747,7 @@ def _labels(
     types: Mapping[str, str],
 ) -> tuple[list[str], dict[str, Integers]]:
     """Lines of a surface, and the faces that are none of a cell."""
-    lines, rest = [], {}
+    lines, unlabelled = [], {}
     for kind, nodes in faces.items():
         left = np.arange(len(nodes)) if kind != "point1" else np.arange(0)
         for cell, rows in cells.items():
@@ -765,8 +765,8 @@ def _labels(
                     lines.append(f"{first[cell] + int(k)}, {'SPOS' if upper else 'SNEG'}")
                 left = left[row < 0]
         if kind == "point1" or len(left):
-            rest[kind] = nodes if kind == "point1" else nodes[left]
-    return lines, rest
+            unlabelled[kind] = nodes if kind == "point1" else nodes[left]
+    return lines, unlabelled
 
 
 def _runs_along(face: Integers, cell: Integers, corners: int) -> bool:

@@ -85,14 +85,14 @@ class _Source:
     def _next(self, kind: str, count: int) -> Any:
         if self.binary:
             size = np.dtype(kind).itemsize * count
-            found = np.frombuffer(self.data[self.at : self.at + size], dtype=f"<{kind}")
+            values = np.frombuffer(self.data[self.at : self.at + size], dtype=f"<{kind}")
             self.at += size
         else:
-            found = np.array(self.tokens[self.next : self.next + count], dtype=np.float64)
+            values = np.array(self.tokens[self.next : self.next + count], dtype=np.float64)
             self.next += count
-        if len(found) < count:
+        if len(values) < count:
             raise GmshError("a section is shorter than it says")
-        return found
+        return values
 
 
 @dataclass
@@ -118,7 +118,7 @@ class _Parts:
 
 def parse(data: bytes) -> Content:
     """The content of a file.  Raises GmshError, ValueError or IndexError where it is damaged."""
-    source, found = _Source(data), _Parts()
+    source, parts = _Source(data), _Parts()
     version = ""
     while source.at < len(data):
         title = source.line()
@@ -129,13 +129,13 @@ def parse(data: bytes) -> Content:
             version = _version(source)
         elif name == "PhysicalNames":
             for _ in range(int(source.line())):
-                dimension, number, words = source.line().split(maxsplit=2)
-                found.names[int(dimension), int(number)] = words.strip('"')
+                dimension, number, quoted_name = source.line().split(maxsplit=2)
+                parts.names[int(dimension), int(number)] = quoted_name.strip('"')
         elif (read := _SECTIONS.get((version[:1], name))) is not None:
             source.open(name)
-            read(source, found, version)
+            read(source, parts, version)
         source.close(name)
-    return _content(found)
+    return _content(parts)
 
 
 def _version(source: _Source) -> str:
@@ -148,22 +148,22 @@ def _version(source: _Source) -> str:
     return version
 
 
-def _nodes_2(source: _Source, found: _Parts, version: str) -> None:
+def _nodes_2(source: _Source, parts: _Parts, version: str) -> None:
     count = int(source.line()) if source.binary else source.one("u8")
     if source.binary:
         size = 28 * count
         kind = np.dtype([("tag", "<i4"), ("x", "<f8", (3,))])
         table = np.frombuffer(source.data[source.at : source.at + size], dtype=kind)
         source.at += size
-        found.tags.append(table["tag"].astype(np.int64))
-        found.points.append(np.array(table["x"]))
+        parts.tags.append(table["tag"].astype(np.int64))
+        parts.points.append(np.array(table["x"]))
     else:
         lines = source.reals(4 * count).reshape(count, 4)
-        found.tags.append(lines[:, 0].astype(np.int64))
-        found.points.append(lines[:, 1:])
+        parts.tags.append(lines[:, 0].astype(np.int64))
+        parts.points.append(lines[:, 1:])
 
 
-def _parametric_2(source: _Source, found: _Parts, version: str) -> None:
+def _parametric_2(source: _Source, parts: _Parts, version: str) -> None:
     """Nodes with the dimension and number of their entity, and their parameters on it."""
     count = int(source.line()) if source.binary else source.one("u8")
     tags, points = [], []
@@ -172,11 +172,11 @@ def _parametric_2(source: _Source, found: _Parts, version: str) -> None:
         points.append(source.reals(3))
         dimension = int(source.whole("i4", 2)[0])
         source.reals(dimension if dimension < 3 else 0)
-    found.tags.append(np.array(tags, dtype=np.int64))
-    found.points.append(np.array(points).reshape(-1, 3))
+    parts.tags.append(np.array(tags, dtype=np.int64))
+    parts.points.append(np.array(points).reshape(-1, 3))
 
 
-def _cells_2(source: _Source, found: _Parts, version: str) -> None:
+def _cells_2(source: _Source, parts: _Parts, version: str) -> None:
     left = int(source.line()) if source.binary else source.one("u8")
     while left > 0:
         if source.binary:
@@ -188,25 +188,25 @@ def _cells_2(source: _Source, found: _Parts, version: str) -> None:
         width = tags + len(CELLS[kind].nodes) + int(source.binary)  # the cell's own number is first
         table = source.whole("i4", count * width).reshape(count, width)[:, int(source.binary) :]
         for group in np.unique(table[:, 0]) if tags else (0,):
-            chosen = table[:, 0] == group if tags else slice(None)
-            known = [(CELLS[kind].dimension, abs(int(group)))] if group else []
-            found.add(kind, table[chosen, tags:], known)
+            rows = table[:, 0] == group if tags else slice(None)
+            groups = [(CELLS[kind].dimension, abs(int(group)))] if group else []
+            parts.add(kind, table[rows, tags:], groups)
         left -= count
 
 
-def _entities_4(source: _Source, found: _Parts, version: str) -> None:
+def _entities_4(source: _Source, parts: _Parts, version: str) -> None:
     for dimension, count in enumerate(source.whole("u8", 4).tolist()):
         for _ in range(count):
             tag = source.one("i4")
             source.reals(3 if dimension == 0 and version == "4.1" else 6)  # its box
             groups = source.whole("i4", source.one("u8")).tolist()
             # the sign of a group tells the direction of an entity
-            found.entities[dimension, tag] = [(dimension, abs(group)) for group in groups]
+            parts.entities[dimension, tag] = [(dimension, abs(group)) for group in groups]
             if dimension:
                 source.whole("i4", source.one("u8"))  # what bounds it
 
 
-def _partitions_4(source: _Source, found: _Parts, version: str) -> None:
+def _partitions_4(source: _Source, parts: _Parts, version: str) -> None:
     """Entities of a mesh in partitions, with the groups of what they are parts of."""
     source.one("u8")
     source.whole("i4", 2 * source.one("u8"))  # ghosts
@@ -216,35 +216,35 @@ def _partitions_4(source: _Source, found: _Parts, version: str) -> None:
             source.whole("i4", source.one("u8"))  # its partitions
             source.reals(6 if dimension else 3)
             groups = source.whole("i4", source.one("u8")).tolist()
-            found.entities[dimension, tag] = [(dimension, abs(group)) for group in groups]
+            parts.entities[dimension, tag] = [(dimension, abs(group)) for group in groups]
             if dimension:
                 source.whole("i4", source.one("u8"))
 
 
-def _nodes_4(source: _Source, found: _Parts, version: str) -> None:
+def _nodes_4(source: _Source, parts: _Parts, version: str) -> None:
     if version != "4.1":
         for _ in range(int(source.whole("u8", 2)[0])):
             _, dimension, parametric = source.whole("i4", 3).tolist()
             width = 4 + (dimension if parametric else 0)
             lines = source.reals(width * (count := source.one("u8"))).reshape(count, width)
-            found.tags.append(lines[:, 0].astype(np.int64))
-            found.points.append(lines[:, 1:4])
+            parts.tags.append(lines[:, 0].astype(np.int64))
+            parts.points.append(lines[:, 1:4])
         return
     for _ in range(int(source.whole("u8", 4)[0])):
         dimension, _, parametric = source.whole("i4", 3).tolist()
         count, width = source.one("u8"), 3 + (dimension if parametric else 0)
-        found.tags.append(source.whole("u8", count))
-        found.points.append(source.reals(count * width).reshape(count, width)[:, :3])
+        parts.tags.append(source.whole("u8", count))
+        parts.points.append(source.reals(count * width).reshape(count, width)[:, :3])
 
 
-def _cells_4(source: _Source, found: _Parts, version: str) -> None:
+def _cells_4(source: _Source, parts: _Parts, version: str) -> None:
     for _ in range(int(source.whole("u8", 4 if version == "4.1" else 2)[0])):
         first, second, number = source.whole("i4", 3).tolist()
         entity = (first, second) if version == "4.1" else (second, first)
         kind, count = _kind(number), source.one("u8")
         width = 1 + len(CELLS[kind].nodes)
         rows = source.whole("u8", count * width).reshape(count, width)[:, 1:]
-        found.add(kind, rows, found.entities.get(entity, []))
+        parts.add(kind, rows, parts.entities.get(entity, []))
 
 
 _SECTIONS = {
@@ -261,8 +261,8 @@ _SECTIONS = {
 
 def _kind(number: int) -> str:
     if number not in _KINDS:
-        known = ", ".join(_KINDS.values())
-        raise GmshError(f"cells of Gmsh's type {number} are not known; known: {known}")
+        allowed = ", ".join(_KINDS.values())
+        raise GmshError(f"cells of Gmsh's type {number} are not known; known: {allowed}")
     return _KINDS[number]
 
 
@@ -271,25 +271,25 @@ def _content(found: _Parts) -> Content:
     if not found.points or not found.rows:
         raise GmshError("there are no nodes or no cells")
     tags = np.concatenate(found.tags)
-    place = np.full(int(tags.max()) + 1, -1)
-    place[tags] = np.arange(len(tags))
+    index_of_tag = np.full(int(tags.max()) + 1, -1)
+    index_of_tag[tags] = np.arange(len(tags))
     cells: dict[str, Integers] = {}
     names: dict[str, dict[str, Integers]] = {name: {} for name in found.names.values()}
     for kind, parts in found.rows.items():
-        rows = place[np.concatenate(parts)]
+        rows = index_of_tag[np.concatenate(parts)]
         if rows.min() < 0:
             raise GmshError(f"a {kind} has a node that is not in the file")
         first, number = firsts(rows)
         cells[kind] = rows[first][:, list(_ORDERS.get(kind, range(rows.shape[1])))]
-        ends = np.cumsum([len(part) for part in parts])[:-1]
+        bounds = np.cumsum([len(part) for part in parts])[:-1]
         members: dict[str, list[Integers]] = {}
-        for chosen, groups in zip(np.split(number, ends), found.groups[kind], strict=True):
+        for numbers, groups in zip(np.split(number, bounds), found.groups[kind], strict=True):
             for name in {found.names[group] for group in groups if group in found.names}:
-                members.setdefault(name, []).append(chosen)
+                members.setdefault(name, []).append(numbers)
         for name, lists in members.items():
             names[name][kind] = np.unique(np.concatenate(lists))
-    kept = {name: members for name, members in names.items() if members}
-    return Content(np.concatenate(found.points), cells, kept, tags)
+    nonempty = {name: members for name, members in names.items() if members}
+    return Content(np.concatenate(found.points), cells, nonempty, tags)
 
 
 def text(

@@ -64,8 +64,8 @@ def content_of(path: Path) -> Content:
             f"{error.name}"
         ) from None
     except _DEFECTS as error:
-        words = " ".join(str(error).split()) or "not a mesh file that meshio knows"
-        raise MeshError(f"{path}: {words}") from None
+        reason = " ".join(str(error).split()) or "not a mesh file that meshio knows"
+        raise MeshError(f"{path}: {reason}") from None
 
 
 def _by_meshio(path: Path) -> Content:
@@ -73,39 +73,41 @@ def _by_meshio(path: Path) -> Content:
     import meshio  # late: it is slow to import
 
     try:
-        found = meshio.read(path)
+        file_mesh = meshio.read(path)
     except meshio.ReadError as error:
         raise ValueError(str(error)) from None
     cells: dict[str, list[Integers]] = {}
     names: dict[str, dict[str, list[Integers]]] = {}
-    points = np.asarray(found.points, dtype=np.float64)
-    named = _named_by_meshio(found)
-    for number, block in enumerate(found.cells):
+    points = np.asarray(file_mesh.points, dtype=np.float64)
+    named = _named_by_meshio(file_mesh)
+    for number, block in enumerate(file_mesh.cells):
         if block.type not in BY_FILE or not BY_FILE[block.type].exponents:
-            known = ", ".join(BY_FILE)
-            raise ValueError(f"cells of kind {block.type!r} are not known; known: {known}")
+            allowed = ", ".join(BY_FILE)
+            raise ValueError(f"cells of kind {block.type!r} are not known; known: {allowed}")
         kind = BY_FILE[block.type].name
-        before = cells.setdefault(kind, [])
-        first = sum(map(len, before))
+        previous = cells.setdefault(kind, [])
+        first = sum(map(len, previous))
         for name, members in named.items():
             names.setdefault(name, {}).setdefault(kind, []).append(first + members[number])
         nodes = np.asarray(block.data, dtype=np.int64)
-        before.append(_upright(kind, points, nodes) if _may_be_turned(path, kind) else nodes)
+        previous.append(_upright(kind, points, nodes) if _may_be_turned(path, kind) else nodes)
     return Content(
         points,
         {kind: np.concatenate(parts) for kind, parts in cells.items()},
         {n: {k: np.unique(np.concatenate(v)) for k, v in m.items()} for n, m in names.items()},
-        sides={name: {"point1": nodes[:, None]} for name, nodes in _named_points(found).items()},
+        sides={
+            name: {"point1": nodes[:, None]} for name, nodes in _named_points(file_mesh).items()
+        },
     )
 
 
-def _named_by_meshio(found: Any) -> dict[str, list[Integers]]:
+def _named_by_meshio(file_mesh: Any) -> dict[str, list[Integers]]:
     """Name -> for each block of cells the numbers of those that have it: sets, families of MED,
     flags of our own, and each value of other whole numbers of cells.
     """
-    named = {n: [np.asarray(m, np.int64) for m in sets] for n, sets in found.cell_sets.items()}
-    families = getattr(found, "cell_tags", None)
-    for data, blocks in found.cell_data.items():
+    named = {n: [np.asarray(m, np.int64) for m in sets] for n, sets in file_mesh.cell_sets.items()}
+    families = getattr(file_mesh, "cell_tags", None)
+    for data, blocks in file_mesh.cell_data.items():
         parts = [np.asarray(values) for values in blocks]
         if any(part.ndim != 1 or part.dtype.kind not in "iu" for part in parts):
             continue
@@ -121,22 +123,22 @@ def _named_by_meshio(found: Any) -> dict[str, list[Integers]]:
             pairs = [(value, f"{label} {value}") for value in values]
         for value, name in pairs:
             inside = [np.flatnonzero(part == value) for part in parts]
-            before = named.get(name, [part[:0] for part in inside])
-            named[name] = [np.concatenate(both) for both in zip(before, inside, strict=True)]
+            previous = named.get(name, [part[:0] for part in inside])
+            named[name] = [np.concatenate(both) for both in zip(previous, inside, strict=True)]
     return named
 
 
-def _named_points(found: Any) -> dict[str, Integers]:
+def _named_points(file_mesh: Any) -> dict[str, Integers]:
     """Name -> numbers of points: sets, families of MED, and flags of our own."""
-    named = {name: np.asarray(nodes, np.int64) for name, nodes in found.point_sets.items()}
-    for data, values in found.point_data.items():
+    named = {name: np.asarray(nodes, np.int64) for name, nodes in file_mesh.point_sets.items()}
+    for data, values in file_mesh.point_data.items():
         if data.startswith(_SIDE):
             named[unquote(data.removeprefix(_SIDE))] = np.flatnonzero(values)
-    families = np.asarray(found.point_data.get("point_tags", ()))
-    for number, some in getattr(found, "point_tags", {}).items():
+    families = np.asarray(file_mesh.point_data.get("point_tags", ()))
+    for number, some in getattr(file_mesh, "point_tags", {}).items():
         for name in some:
-            before = named.get(name, np.empty(0, np.int64))
-            named[name] = np.union1d(before, np.flatnonzero(families == number))
+            previous = named.get(name, np.empty(0, np.int64))
+            named[name] = np.union1d(previous, np.flatnonzero(families == number))
     return named
 
 
@@ -173,25 +175,25 @@ def mesh_of(content: Content, points: Array, top: int) -> tuple[Mesh, Integers]:
     groups: dict[str, dict[str, Integers]] = {}
     sides: dict[str, dict[str, Integers]] = {n: dict(side) for n, side in content.sides.items()}
     for name, members in names.items():
-        dimensions = [CELLS[kind].dimension for kind, chosen in members.items() if len(chosen)]
+        dimensions = [CELLS[kind].dimension for kind, numbers in members.items() if len(numbers)]
         side = max((d for d in dimensions if d < top), default=-1)
-        for kind, chosen in members.items():
-            if not len(chosen):
+        for kind, numbers in members.items():
+            if not len(numbers):
                 continue
             if CELLS[kind].dimension == top:
-                groups.setdefault(name, {})[kind] = chosen
+                groups.setdefault(name, {})[kind] = numbers
             elif CELLS[kind].dimension == side:
-                sides.setdefault(name, {})[kind] = cells[kind][chosen]
+                sides.setdefault(name, {})[kind] = cells[kind][numbers]
     main = {kind: nodes for kind, nodes in cells.items() if CELLS[kind].dimension == top}
     used = np.unique(np.concatenate([nodes.ravel() for nodes in main.values()]))
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
     lost = []
     for name, faces in list(sides.items()):
-        own = {kind: number[nodes] for kind, nodes in faces.items()}
-        kept = {kind: nodes[(nodes >= 0).all(axis=1)] for kind, nodes in own.items()}
-        sides[name] = {kind: nodes for kind, nodes in kept.items() if len(nodes)}
-        if any(len(kept[kind]) < len(nodes) for kind, nodes in own.items()):
+        renumbered = {kind: number[nodes] for kind, nodes in faces.items()}
+        complete = {kind: nodes[(nodes >= 0).all(axis=1)] for kind, nodes in renumbered.items()}
+        sides[name] = {kind: nodes for kind, nodes in complete.items() if len(nodes)}
+        if any(len(complete[kind]) < len(nodes) for kind, nodes in renumbered.items()):
             lost.append(name)
         if not sides[name]:
             del sides[name]
@@ -265,15 +267,15 @@ def _flagged(mesh: Mesh, safe: str) -> tuple[dict[str, Integers], dict[str, Any]
     data: dict[str, Any] = {}
     for name, members in names.items():
         title = quote(name, safe=safe)
-        found = {kind: np.zeros(len(nodes), np.int8) for kind, nodes in cells.items()}
-        for kind, chosen in members.items():
+        cell_flags = {kind: np.zeros(len(nodes), np.int8) for kind, nodes in cells.items()}
+        for kind, numbers in members.items():
             if kind == "point1":
                 data[_SIDE + title] = np.zeros(len(mesh.points), np.int8)
-                data[_SIDE + title][points[chosen]] = 1
+                data[_SIDE + title][points[numbers]] = 1
             else:
-                found[kind][chosen] = 1
+                cell_flags[kind][numbers] = 1
         if set(members) - {"point1"}:
-            flags[(_GROUP if name in mesh.groups else _SIDE) + title] = list(found.values())
+            flags[(_GROUP if name in mesh.groups else _SIDE) + title] = list(cell_flags.values())
     return {kind: for_vtk(kind, nodes) for kind, nodes in cells.items()}, flags, data
 
 
@@ -283,7 +285,7 @@ def _named(mesh: Mesh) -> tuple[dict[str, Integers], dict[str, dict[str, Integer
     names = {name: dict(group) for name, group in mesh.groups.items()}
     for name in mesh.sides:
         for kind, faces in mesh.faces(name).items():
-            before = cells.get(kind, faces[:0])
-            names.setdefault(name, {})[kind] = len(before) + np.arange(len(faces))
-            cells[kind] = np.concatenate([before, faces])
+            previous = cells.get(kind, faces[:0])
+            names.setdefault(name, {})[kind] = len(previous) + np.arange(len(faces))
+            cells[kind] = np.concatenate([previous, faces])
     return cells, names

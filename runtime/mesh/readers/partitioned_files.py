@@ -65,35 +65,35 @@ def _read(path: Path) -> Part:
 
 
 def _from_arrays(path: Path) -> Part:
-    found = read_arrays(path)
-    if found is None or not {"points", "numbers"} <= found.keys():
+    arrays = read_arrays(path)
+    if arrays is None or not {"points", "numbers"} <= arrays.keys():
         raise MeshError(f"{path}: damaged, or not written by write(parts=...)")
     cells: dict[str, Integers] = {}
     named: dict[str, dict[str, dict[str, Integers]]] = {"group": {}, "side": {}}
-    for key, values in found.items():
-        what, _, rest = key.partition(":")
-        kind, _, name = rest.partition(":")
+    for key, values in arrays.items():
+        what, _, suffix = key.partition(":")
+        kind, _, name = suffix.partition(":")
         if what == "cells":
             cells[kind] = values.astype(np.int64)
         elif what in named:
             named[what].setdefault(name, {})[kind] = values.astype(np.int64)
-    mesh = Mesh(found["points"], cells, named["group"], named["side"])
-    return mesh, found["numbers"].astype(np.int64)
+    mesh = Mesh(arrays["points"], cells, named["group"], named["side"])
+    return mesh, arrays["numbers"].astype(np.int64)
 
 
 def _merged(parts: Sequence[Part]) -> Part:
     """Several parts as one, nodes in the order of their numbers."""
     every = np.concatenate([numbers for _, numbers in parts])
-    numbers, first, place = np.unique(every, return_index=True, return_inverse=True)
-    ends = np.cumsum([len(n) for _, n in parts])[:-1]
+    numbers, first, inverse = np.unique(every, return_index=True, return_inverse=True)
+    bounds = np.cumsum([len(n) for _, n in parts])[:-1]
     cells: dict[str, list[Integers]] = {}
     groups: dict[str, dict[str, list[Integers]]] = {}
     sides: dict[str, dict[str, list[Integers]]] = {}
-    for (mesh, _), at in zip(parts, np.split(place.ravel(), ends), strict=True):
+    for (mesh, _), at in zip(parts, np.split(inverse.ravel(), bounds), strict=True):
         for name, group in mesh.groups.items():
             for kind, rows in group.items():
-                before = sum(map(len, cells.get(kind, ())))
-                groups.setdefault(name, {}).setdefault(kind, []).append(before + rows)
+                offset = sum(map(len, cells.get(kind, ())))
+                groups.setdefault(name, {}).setdefault(kind, []).append(offset + rows)
         for kind, nodes in mesh.cells.items():
             cells.setdefault(kind, []).append(at[nodes])
         for name, side in mesh.sides.items():
@@ -130,8 +130,10 @@ def write_parts(mesh: Mesh, path: Path, count: int) -> None:
     parts = dict(zip(mesh.cells, rows, strict=True))
     left = {name: dict(mesh.faces(name)) for name in mesh.sides}
     for number in range(count):
-        found = _Chosen.of(mesh, {kind: np.flatnonzero(p == number) for kind, p in parts.items()})
-        write_arrays(_file(path, number), found.arrays(mesh, left))
+        selection = _Chosen.of(
+            mesh, {kind: np.flatnonzero(p == number) for kind, p in parts.items()}
+        )
+        write_arrays(_file(path, number), selection.arrays(mesh, left))
     lost = [name for name, side in left.items() if any(map(len, side.values()))]
     if lost:
         raise MeshError(f"write(parts=...): side {lost[0]!r} has faces of no cell")
@@ -142,8 +144,10 @@ def _cut(centres: Array, chosen: Integers, parts: range, part: Integers) -> None
     if len(parts) == 1:
         part[chosen] = parts[0]
         return
-    places, half = centres[chosen], len(parts) // 2
-    order = chosen[np.argsort(places[:, np.ptp(places, axis=0).argmax()], kind="stable")]
+    centres_here, half = centres[chosen], len(parts) // 2
+    order = chosen[
+        np.argsort(centres_here[:, np.ptp(centres_here, axis=0).argmax()], kind="stable")
+    ]
     first = len(chosen) * half // len(parts)
     _cut(centres, order[:first], parts[:half], part)
     _cut(centres, order[first:], parts[half:], part)
@@ -160,30 +164,30 @@ class _Chosen:
     @classmethod
     def of(cls, mesh: Mesh, rows: Mapping[str, Integers]) -> _Chosen:
         used = np.unique(np.concatenate([mesh.cells[k][r].ravel() for k, r in rows.items()]))
-        place = np.full(len(mesh.points), -1)
-        place[used] = np.arange(len(used))
-        return cls(rows, used, place)
+        position = np.full(len(mesh.points), -1)
+        position[used] = np.arange(len(used))
+        return cls(rows, used, position)
 
     def arrays(self, mesh: Mesh, left: dict[str, dict[str, Integers]]) -> dict[str, Array]:
         """Arrays of the file; faces of sides are taken out of those that are `left`."""
-        found: dict[str, Any] = {"points": mesh.points[self.used], "numbers": self.used}
+        result: dict[str, Any] = {"points": mesh.points[self.used], "numbers": self.used}
         faces: dict[str, list[Integers]] = {}
         for kind, rows in self.rows.items():
             nodes = mesh.cells[kind][rows]
-            found[f"cells:{kind}"] = self.place[nodes]
+            result[f"cells:{kind}"] = self.place[nodes]
             for face, local in CELLS[kind].side_nodes:
                 faces.setdefault(face.name, []).append(nodes[:, list(local)])
         for name, group in mesh.groups.items():
             for kind, members in group.items():
                 at = np.flatnonzero(np.isin(self.rows[kind], members))
-                found[f"group:{kind}:{name}"] = at
+                result[f"group:{kind}:{name}"] = at
         for name, side in left.items():
-            for kind, there in side.items():
+            for kind, side_faces in side.items():
                 if kind in faces:
-                    known = np.concatenate(faces[kind])
-                    own = matched(there, known, CELLS[kind].corners) >= 0
+                    cell_faces = np.concatenate(faces[kind])
+                    belongs = matched(side_faces, cell_faces, CELLS[kind].corners) >= 0
                 else:  # points or edges: in the first part that has them
-                    own = np.asarray((self.place[there] >= 0).all(axis=1))
-                found[f"side:{kind}:{name}"] = self.place[there[own]]
-                side[kind] = there[~own]
-        return found
+                    belongs = np.asarray((self.place[side_faces] >= 0).all(axis=1))
+                result[f"side:{kind}:{name}"] = self.place[side_faces[belongs]]
+                side[kind] = side_faces[~belongs]
+        return result

@@ -38,9 +38,9 @@ class Entries:
     def of(cls, K: SparseMatrix, order: Integers, block: int = 1) -> Entries:
         """Of the pattern of K, (n, n), with blocks of so many rows and columns."""
         numbers = csr_array((np.arange(1, K.nnz + 1), K.indices, K.indptr), shape=K.shape)
-        place = csr_array(numbers[order][:, order].T)  # of columns that are taken for rows
-        place.sort_indices()
-        blocks = bsr_array(place.tobsr((block, block)))
+        positions = csr_array(numbers[order][:, order].T)  # of columns that are taken for rows
+        positions.sort_indices()
+        blocks = bsr_array(positions.tobsr((block, block)))
         blocks.data -= 1
         return cls(K.indices, K.indptr, blocks)
 
@@ -50,12 +50,12 @@ class Entries:
 
     def taken(self, K: SparseMatrix) -> tuple[Any, bool]:
         """K in the order, by blocks, and whether it is symmetric."""
-        place = self.place
-        data = np.append(K.data, 0.0)[place.data]
-        found = bsr_array((data, place.indices, place.indptr), shape=place.shape)
-        u, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, place.shape[0]))
-        uneven = abs(float(u @ (found @ v) - v @ (found @ u)))
-        return found, uneven <= _UNSYMMETRIC * float(
+        positions = self.place
+        data = np.append(K.data, 0.0)[positions.data]
+        permuted = bsr_array((data, positions.indices, positions.indptr), shape=positions.shape)
+        u, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, positions.shape[0]))
+        uneven = abs(float(u @ (permuted @ v) - v @ (permuted @ u)))
+        return permuted, uneven <= _UNSYMMETRIC * float(
             max(data.max(initial=0.0), -data.min(initial=0.0))
         )
 
@@ -121,17 +121,17 @@ class Multigrid:
                 f"multigrid knows {len(order)} unknowns, the matrix has {K.shape[0]}: paths by arc "
                 'length and the like need linear = "direct"'
             )
-        held = (sums == diagonal)[order]  # prescribed: nothing else in the row
+        prescribed = (sums == diagonal)[order]  # prescribed: nothing else in the row
         if self._entries is None or not self._entries.fit(K):
             self._entries = Entries.of(K, order, self.modes.block)
         A, symmetric = self._entries.taken(K)
         grids = self._grids
-        if grids is None or not (symmetric and grids.serve(held)):
+        if grids is None or not (symmetric and grids.serve(prescribed)):
             diagonal = diagonal[order]
             scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-            near = np.where(held[:, None], 0.0, self.modes.near / scale[:, None])
+            nullspace = np.where(prescribed[:, None], 0.0, self.modes.near / scale[:, None])
             smoother = CHEBYSHEV if symmetric else GAUSS_SEIDEL
-            grids = Grids(scale, near, held, self.modes.block, smoother)
+            grids = Grids(scale, nullspace, prescribed, self.modes.block, smoother)
             self._grids = grids if symmetric else None
         for scaled in (scale_rows, scale_columns):
             scaled(A, grids.scale, copy=False)
@@ -191,7 +191,7 @@ def hierarchy(
     """
     import pyamg
 
-    before, after = (FORWARD, BACKWARD) if light else (smoother, smoother)
+    presmoother, postsmoother = (FORWARD, BACKWARD) if light else (smoother, smoother)
     with np.errstate(all="ignore"):
         return pyamg.smoothed_aggregation_solver(
             A.tobsr((block, block)),
@@ -199,8 +199,8 @@ def hierarchy(
             strength=("symmetric", {"theta": 0.0}),
             smooth=("energy", {"krylov": "cg"}) if light else "jacobi",
             improve_candidates=None,
-            presmoother=before,
-            postsmoother=after,
+            presmoother=presmoother,
+            postsmoother=postsmoother,
             max_coarse=_COARSEST,
         )
 
@@ -221,28 +221,28 @@ class Preconditioned:
         if not b.any():
             return np.zeros(len(b))
         right = self.grids.scale * b[self.order]
-        found, left = self._cycles("cg", right) if self.symmetric else (right, np.inf)
-        if not left <= 10.0 * self.tolerance and not self.grids.own(self.matrix):
+        scaled, residual = self._cycles("cg", right) if self.symmetric else (right, np.inf)
+        if not residual <= 10.0 * self.tolerance and not self.grids.own(self.matrix):
             self.grids.renewed(self.matrix)
-            found, left = self._cycles("cg", right)
-        if not left <= 10.0 * self.tolerance:  # far from balance tangents are indefinite
-            found, left = self._cycles("gmres", right)
-        if not left <= 10.0 * self.tolerance:
+            scaled, residual = self._cycles("cg", right)
+        if not residual <= 10.0 * self.tolerance:  # far from balance tangents are indefinite
+            scaled, residual = self._cycles("gmres", right)
+        if not residual <= 10.0 * self.tolerance:
             self.grids.worn = True
             raise SingularMatrix(
-                f"multigrid left {left:.1e} of the right side after {self.most} steps; allowed are "
-                f'{self.tolerance:.0e}. Use linear = "direct"'
+                f"multigrid left {residual:.1e} of the right side after {self.most} steps; allowed "
+                f'are {self.tolerance:.0e}. Use linear = "direct"'
             )
         x = np.empty(len(b))
-        x[self.order] = self.grids.scale * found
+        x[self.order] = self.grids.scale * scaled
         return x
 
     def _cycles(self, method: str, b: Array) -> tuple[Array, float]:
         """Solution of a Krylov method, and what it leaves of b, relative to it."""
         x, steps, _ = self._solved(method, b)
         self.grids.took(steps)
-        left = np.linalg.norm(b - self.matrix @ x) / np.linalg.norm(b)
-        return x, float(left)
+        residual = np.linalg.norm(b - self.matrix @ x) / np.linalg.norm(b)
+        return x, float(residual)
 
     def _solved(self, method: str, b: Array) -> tuple[Array, int, bool]:
         """Solution of a Krylov method, iterations, and whether the matrix turned out indefinite.
@@ -254,8 +254,8 @@ class Preconditioned:
         cycle = self.grids.of(self.matrix).aspreconditioner(cycle="V")
         norms = list[float]()
         with warnings.catch_warnings(record=True):
-            given = {"tol": self.tolerance, "maxiter": self.most, "M": cycle, "residuals": norms}
-            x, info = getattr(krylov, method)(self.matrix, b, **given)
+            options = {"tol": self.tolerance, "maxiter": self.most, "M": cycle, "residuals": norms}
+            x, info = getattr(krylov, method)(self.matrix, b, **options)
         return x, len(norms), info < 0
 
     def unconstrained_unknown(self) -> None:
@@ -336,5 +336,5 @@ class _Either:
 
     def pivots(self) -> Array | None:
         """Of the factors that stand in, if they know them."""
-        known = getattr(self.factors, "pivots", None)
-        return None if known is None else known()
+        method = getattr(self.factors, "pivots", None)
+        return None if method is None else method()

@@ -51,9 +51,9 @@ class Order:
         count = csc_array((np.arange(1.0, K.nnz + 1.0), K.indices, K.indptr), shape=(n, n))
         arranged = csc_array(count[unknowns, :][:, unknowns])
         arranged.sort_indices()
-        places = arranged.data.astype(np.int32) - 1
+        positions = arranged.data.astype(np.int32) - 1
         return cls(
-            (K.indptr, K.indices), boundary, unknowns, arranged.indptr, arranged.indices, places
+            (K.indptr, K.indices), boundary, unknowns, arranged.indptr, arranged.indices, positions
         )
 
     def fits(self, K: SparseMatrix, boundary: Integers) -> bool:

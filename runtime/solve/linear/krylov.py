@@ -43,13 +43,13 @@ def conjugate_gradients(
     """
     x, r = np.zeros_like(b), b.copy()
     target = tolerance * float(np.sqrt(dot(b, b)))
-    p, before = np.zeros_like(b), 1.0
+    p, previous_rho = np.zeros_like(b), 1.0
     for k in range(most):
         if float(np.sqrt(dot(r, r))) <= target:
             return Found(x, k, converged=True)
         z = precondition(r)
         product = float(dot(r, z))
-        p *= product / before
+        p *= product / previous_rho
         p += z
         Ap = apply(p)
         curvature = float(dot(p, Ap))
@@ -58,7 +58,7 @@ def conjugate_gradients(
         x += product / curvature * p
         Ap *= product / curvature
         r -= Ap
-        before = product
+        previous_rho = product
     return Found(x, most, converged=False)
 
 
@@ -68,7 +68,7 @@ def minimal_residuals(
     """x of A x = b for any A, by GMRES; otherwise as `conjugate_gradients`."""
     counts, n = [0], len(b)
 
-    def told(_: float) -> None:
+    def count_iteration(_: float) -> None:
         counts[0] += 1
 
     A = LinearOperator((n, n), matvec=apply, dtype=np.float64)
@@ -81,7 +81,7 @@ def minimal_residuals(
         maxiter=-(-most // restart),
         M=M,
         restart=restart,
-        callback=told,
+        callback=count_iteration,
         callback_type="pr_norm",
     )
     return Found(np.asarray(x), counts[0], converged=not failed)

@@ -138,8 +138,8 @@ class Factorisation:
 
     def transposed(self) -> Factorisation | None:
         """Factors of the transpose by these; None where they cannot be used so."""
-        known = getattr(self.factors, "transposed", None)
-        factors = None if known is None else known()
+        method = getattr(self.factors, "transposed", None)
+        factors = None if method is None else method()
         if factors is None:
             return None
         K = csc_array(self.matrix.T)
@@ -149,13 +149,13 @@ class Factorisation:
 
     def pivots(self) -> Array | None:
         """Pivots (n,) where they are all on the diagonal, as in L D L'; None where not known."""
-        known = getattr(self.factors, "pivots", None)
-        return None if known is None else known()
+        method = getattr(self.factors, "pivots", None)
+        return None if method is None else method()
 
     def sign(self) -> float | None:
         """Sign of the determinant; None where it is not known."""
-        known = getattr(self.factors, "sign", None)
-        return None if known is None else known()
+        method = getattr(self.factors, "sign", None)
+        return None if method is None else method()
 
     def _backward_error(self, x: Array, b: Array) -> float:
         """Largest |b - A x|_i / (|A|_i |x|_max + |b|_i); each row has its own units."""

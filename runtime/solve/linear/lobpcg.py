@@ -43,8 +43,8 @@ def lowest(K: csc_array, M: csc_array, modes: Modes, count: int) -> tuple[Array,
     for _ in range(_ROUNDS):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # residuals are looked at below
-            found = lobpcg(A, X, B=B, M=P, tol=tolerance, maxiter=_ROUND, largest=False)
-        values, X = (np.asarray(part, dtype=np.float64) for part in found[:2])
+            result = lobpcg(A, X, B=B, M=P, tol=tolerance, maxiter=_ROUND, largest=False)
+        values, X = (np.asarray(part, dtype=np.float64) for part in result[:2])
         inertia = np.abs(values).max() * np.linalg.norm(B @ X, axis=0)
         left = np.linalg.norm(A @ X - (B @ X) * values, axis=0)
         if (left <= _EXACT * inertia)[np.argsort(values)[:count]].all():
@@ -55,8 +55,8 @@ def lowest(K: csc_array, M: csc_array, modes: Modes, count: int) -> tuple[Array,
             f"{count} modes: multigrid left {(left / inertia).max():.1e} of them after "
             f'{_ROUNDS * _ROUND} iterations; use linear = "direct"'
         )
-    chosen, shapes = np.argsort(values)[:count], np.zeros((count, len(order)))
-    shapes[:, order] = ((grids.scale * moving)[:, None] * X[:, chosen]).T
+    order_of_values, shapes = np.argsort(values)[:count], np.zeros((count, len(order)))
+    shapes[:, order] = ((grids.scale * moving)[:, None] * X[:, order_of_values]).T
     sizes = np.sqrt(np.einsum("kn,kn->k", shapes, (M @ shapes.T).T))
     shapes /= sizes[:, None]
-    return without_rounding(values[chosen], terms(K, shapes)), signed(shapes)
+    return without_rounding(values[order_of_values], terms(K, shapes)), signed(shapes)

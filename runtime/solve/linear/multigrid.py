@@ -90,17 +90,17 @@ def largest(apply: Apply, diagonal: Array) -> float:
     root = 1.0 / np.sqrt(diagonal)
     v = np.random.default_rng(0).uniform(-1.0, 1.0, len(diagonal))
     v /= np.linalg.norm(v)
-    before, off = np.zeros_like(v), 0.0
+    previous, beta = np.zeros_like(v), 0.0
     alphas, betas = [], []
     for _ in range(_POWERS):
-        w = root * apply(root * v) - off * before
+        w = root * apply(root * v) - beta * previous
         alphas.append(float(w @ v))
         w -= alphas[-1] * v
-        off = float(np.linalg.norm(w))
-        if not off > 1e-12 * abs(alphas[0]):
+        beta = float(np.linalg.norm(w))
+        if not beta > 1e-12 * abs(alphas[0]):
             break
-        betas.append(off)
-        before, v = v, w / off
+        betas.append(beta)
+        previous, v = v, w / beta
     size = len(alphas)
     T = np.diag(alphas) + np.diag(betas[: size - 1], 1) + np.diag(betas[: size - 1], -1)
     return float(np.abs(np.linalg.eigvalsh(T)).max())

@@ -45,11 +45,11 @@ class Team:
         self.forgotten.clear()
         for rank in range(1, comm.size):
             comm.send((task, number, parts[rank], old), dest=rank)
-        found: list[Any] = comm.gather(self.work(task, number, parts[0], old))
-        errors = [f for f in found if isinstance(f, str)]
+        results: list[Any] = comm.gather(self.work(task, number, parts[0], old))
+        errors = [f for f in results if isinstance(f, str)]
         if errors:
             raise SingularMatrix(f"MUMPS: {errors[0]}")
-        return found
+        return results
 
     def work(self, task: str, number: int, part: Any, old: tuple[int, ...]) -> Any:
         """One process's share of a task; a text if PETSc refuses."""
@@ -69,10 +69,10 @@ class Team:
         bounds = np.linspace(0, rows.shape[0], comm.size + 1).astype(int)
         parts = [_rows(rows, int(a), int(b)) for a, b in pairwise(bounds)]
         self.numbers += 1
-        found = Spread(self, self.numbers, bounds)
-        weakref.finalize(found, self.forgotten.append, self.numbers)
+        factors = Spread(self, self.numbers, bounds)
+        weakref.finalize(factors, self.forgotten.append, self.numbers)
         self.call("factorise", self.numbers, parts)
-        return found
+        return factors
 
 
 def _rows(K: csr_array[np.float64], first: int, last: int) -> tuple[Any, ...]:
@@ -81,9 +81,9 @@ def _rows(K: csr_array[np.float64], first: int, last: int) -> tuple[Any, ...]:
     return K.shape[0], last - first, part.indptr.astype(kind), part.indices.astype(kind), part.data
 
 
-def _factors(size: int, own: int, starts: Any, columns: Any, values: Array) -> Any:
+def _factors(size: int, n_rows: int, starts: Any, columns: Any, values: Array) -> Any:
     PETSc, comm = petsc(), world()
-    matrix = PETSc.Mat().createAIJ(((own, size), (own, size)), csr=(starts, columns, values))
+    matrix = PETSc.Mat().createAIJ(((n_rows, size), (n_rows, size)), csr=(starts, columns, values))
     ksp = PETSc.KSP().create(comm)
     ksp.setOperators(matrix)
     ksp.setType("preonly")
@@ -105,10 +105,10 @@ def _solution(ksp: Any, b: Array) -> Array:
     X.setUp()
     X.assemble()
     ksp.matSolve(B, X)
-    found = np.array(X.getDenseArray(readonly=True))
+    rows = np.array(X.getDenseArray(readonly=True))
     B.destroy()
     X.destroy()
-    return found
+    return rows
 
 
 @dataclass(eq=False)
@@ -123,8 +123,8 @@ class Spread:
         """The solution for right sides b, (n,) or (n, j)."""
         table = b if b.ndim == 2 else b[:, None]
         parts = np.split(np.asarray(table), self.bounds[1:-1])
-        found = np.concatenate(self.team.call("solve", self.number, parts))
-        return found if b.ndim == 2 else found[:, 0]
+        solution = np.concatenate(self.team.call("solve", self.number, parts))
+        return solution if b.ndim == 2 else solution[:, 0]
 
 
 @dataclass(frozen=True)

@@ -40,10 +40,10 @@ class Condensing:
 
     def external(self, size: int) -> Integers:
         """All other unknowns of so many, rising."""
-        kept: Flags = np.ones(size, dtype=bool)
+        mask: Flags = np.ones(size, dtype=bool)
         for group in self.groups:
-            kept[group] = False
-        return np.flatnonzero(kept)
+            mask[group] = False
+        return np.flatnonzero(mask)
 
     def factorise(self, K: SparseMatrix) -> Eliminated:
         """Factors of K, (n, n); raises SingularMatrix, also where internal unknowns are loose."""
@@ -86,26 +86,28 @@ class Eliminated:
         x, right = np.empty(len(b)), b[self.external]
         for part in self.parts:
             right = right - part.back @ (part.inverse @ b[part.inner])
-        x[self.external] = found = self.rest.solve(right)
+        x[self.external] = external = self.rest.solve(right)
         for part in self.parts:
-            x[part.inner] = part.inverse @ (b[part.inner] - part.out @ found)
+            x[part.inner] = part.inverse @ (b[part.inner] - part.out @ external)
         return x
 
     def pivots(self) -> Array | None:
         """Pivots of the rest (m,), see `Factorisation.pivots`."""
-        known = getattr(self.rest, "pivots", None)
-        return None if known is None else known()
+        method = getattr(self.rest, "pivots", None)
+        return None if method is None else method()
 
     def sign(self) -> float | None:
         """Sign of the determinant; None where it is not known."""
-        known = getattr(self.rest, "sign", None)
-        found = None if known is None else known()
-        return None if found is None else found * float(np.prod([p.sign for p in self.parts]))
+        method = getattr(self.rest, "sign", None)
+        rest_sign = None if method is None else method()
+        return (
+            None if rest_sign is None else rest_sign * float(np.prod([p.sign for p in self.parts]))
+        )
 
     def indefinite(self) -> bool | None:
         """True if the rest has a negative eigenvalue; None where it is not known."""
-        known = getattr(self.rest, "indefinite", None)
-        return None if known is None else known()
+        method = getattr(self.rest, "indefinite", None)
+        return None if method is None else method()
 
     def unconstrained_unknown(self) -> int | None:
         """See `JudgesSingularity`: what K_II admits is regular, so the rest decides."""

@@ -82,13 +82,13 @@ class SuperLU:
 
     def _order(self, K: SparseMatrix) -> Order:
         """The order of the pattern of K, (n, n)."""
-        known = self.orders.find(K)
-        return known or self.orders.add(Order.of(K, self._found(K)))
+        cached = self.orders.find(K)
+        return cached or self.orders.add(Order.of(K, self._found(K)))
 
     def _last(self, K: SparseMatrix, boundary: Integers) -> Order:
         """The order of the pattern of K, (n, n), with the boundary (m,) last."""
-        known = self.orders.find(K)
-        return Order.of(K, known.unknowns if known else self._found(K), boundary)
+        cached = self.orders.find(K)
+        return Order.of(K, cached.unknowns if cached else self._found(K), boundary)
 
     def _found(self, K: SparseMatrix) -> Integers:
         """All unknowns (n,) as they are eliminated: an incomplete factorisation costs least."""
