@@ -11,7 +11,6 @@ from pathlib import Path
 import softehl
 
 ROOT = Path(__file__).parents[1]
-CALLED = ("__init__", "__call__", "__getitem__", "__iter__")
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
@@ -28,12 +27,11 @@ class Place:
 
 @dataclass(frozen=True)
 class Member:
-    """An annotated function, or the annotated fields of a class (`node` is the class)."""
+    """A public class or function, or a method of one."""
 
     label: str
     module: str
     node: ast.AST
-    documented: bool = True
 
 
 @cache
@@ -110,11 +108,6 @@ def lineage(module: str, kind: ast.ClassDef) -> Iterator[tuple[str, ast.ClassDef
                 yield from lineage(found[0], found[1])
 
 
-def public(node: ast.AST) -> bool:
-    name = getattr(node, "name", "_")
-    return name in CALLED or not name.startswith("_")
-
-
 def exports() -> dict[str, tuple[str, ast.AST]]:
     """Public name -> where it is defined; modules are left out."""
     found = {}
@@ -128,30 +121,11 @@ def exports() -> dict[str, tuple[str, ast.AST]]:
     return found
 
 
-def members() -> Iterator[Member]:
-    """Public functions, and of public classes fields and methods; inherited ones once each."""
-    for name, (module, node) in exports().items():
-        if isinstance(node, Function):
-            yield Member(name, module, node)
-        elif isinstance(node, ast.ClassDef):
-            seen = set()
-            for where, kind in lineage(module, node):
-                yield Member(name, where, kind)
-                for method in kind.body:
-                    if isinstance(method, Function) and public(method):
-                        if method.name not in seen:
-                            yield Member(f"{name}.{method.name}", where, method)
-                        seen.add(method.name)
-
-
-def annotations(member: Member) -> Iterator[tuple[str, ast.expr]]:
+def annotated(member: Member) -> Iterator[tuple[str, ast.expr]]:
     """Name and annotation of each parameter or field, "return" of what is returned."""
     node = member.node
     if isinstance(node, ast.ClassDef):
-        for field in node.body:
-            name = ast.unparse(field.target) if isinstance(field, ast.AnnAssign) else "_"
-            if isinstance(field, ast.AnnAssign) and not name.startswith("_"):
-                yield name, field.annotation
+        yield from fields(node)
     elif isinstance(node, Function):
         for argument in arguments(node):
             if argument.annotation is not None:
@@ -160,9 +134,19 @@ def annotations(member: Member) -> Iterator[tuple[str, ast.expr]]:
             yield "return", node.returns
 
 
+def fields(kind: ast.ClassDef) -> list[tuple[str, ast.expr]]:
+    """Public annotated names of a class, but for constants."""
+    found = []
+    for node in kind.body:
+        name = ast.unparse(node.target) if isinstance(node, ast.AnnAssign) else "_"
+        if isinstance(node, ast.AnnAssign) and not name.startswith("_"):
+            found.append((name, node.annotation))
+    return [(name, annotation) for name, annotation in found if "ClassVar" not in words(annotation)]
+
+
 def arguments(node: Function) -> list[ast.arg]:
     """All parameters of a function, without self and cls."""
     a = node.args
-    extra = [arg for arg in (a.vararg, a.kwarg) if arg is not None]
-    every = [*a.posonlyargs, *a.args, *a.kwonlyargs, *extra]
+    first, last = ([arg] if arg is not None else [] for arg in (a.vararg, a.kwarg))
+    every = [*a.posonlyargs, *a.args, *first, *a.kwonlyargs, *last]
     return [arg for arg in every if arg.arg not in ("self", "cls")]

@@ -58,7 +58,7 @@ class Element:
 
     @property
     def lines(self) -> tuple[tuple[int, ...], ...] | None:
-        """Of elements of order 3 and more: along every direction the node of a line, by nodes."""
+        """Node of a line in every direction, by nodes of the element; None below order 3."""
         order = len({place[0] for place in self.nodes}) - 1
         if order < 3:
             return None

@@ -52,7 +52,17 @@ class QuadratureRule:
 
 @dataclass(frozen=True)
 class Region:
-    """A reference cell: its name, where it is, its measure, and a rule for it."""
+    """Reference cell of quadrature.
+
+    Attributes
+    ----------
+    name : str
+        Such as "triangle".
+    measure : Rational
+        Length, area or volume.
+    rule : str
+        A rule for it, in words.
+    """
 
     name: str
     measure: sp.Rational
@@ -89,14 +99,35 @@ REGIONS = {
 
 
 def point_rule() -> QuadratureRule:
-    """The rule of a model without an integral: one point, no coordinates, weight one."""
+    """Return the rule of a model without an integral: one point, no coordinates, weight one.
+
+    Returns
+    -------
+    QuadratureRule
+        The rule.
+    """
     return QuadratureRule(0, ((),), (sp.Integer(1),))
 
 
 def gauss(order: int, dimension: int) -> QuadratureRule:
-    """Gauss-Legendre product rule with `order` points in each direction on [-1, 1].
+    """Return the product rule of Gauss and Legendre on [-1, 1] in each direction.
 
-    Any order of at least 1: points are exact up to 3, beyond that rational to 100 digits.
+    Parameters
+    ----------
+    order : int
+        Number of points in each direction; they are exact up to 3, rational to 100 digits above.
+    dimension : int
+        Number of directions.
+
+    Returns
+    -------
+    QuadratureRule
+        The rule.
+
+    Raises
+    ------
+    ValueError
+        A number is below 1.
     """
     _require("gauss", "order", order)
     if dimension not in (1, 2, 3):
@@ -107,8 +138,17 @@ def gauss(order: int, dimension: int) -> QuadratureRule:
 
 
 def lobatto(order: int) -> tuple[Any, ...]:
-    """Points of Gauss and Lobatto inside (-1, 1), rising: with both ends as many as nodes of a line
-    of this order, 1 to 6; rational to 100 digits where they are no rational numbers.
+    """Return the inner points of Gauss and Lobatto in (-1, 1), rising.
+
+    Parameters
+    ----------
+    order : int
+        Order of a line, 1 to 6, whose nodes are both ends and these points.
+
+    Returns
+    -------
+    tuple of Expr
+        Coordinates, rational to 100 digits where they are no rational numbers.
     """
     root = sp.sqrt
     squares = {  # of the positive ones, roots of the derivative of Legendre's polynomial
@@ -127,9 +167,22 @@ def lobatto(order: int) -> tuple[Any, ...]:
 
 
 def triangle(degree: int) -> QuadratureRule:
-    """Rule on the unit triangle for polynomials of a degree, at least.
+    """Return a rule on the unit triangle.
 
-    Symmetric of 1 and 3 points up to degree 2, beyond that Gauss and Jacobi with collapsed sides.
+    Parameters
+    ----------
+    degree : int
+        Degree of polynomials that it integrates exactly.
+
+    Returns
+    -------
+    QuadratureRule
+        Symmetric, of 1 and 3 points, up to degree 2; Gauss and Jacobi with collapsed sides above.
+
+    Raises
+    ------
+    ValueError
+        The degree is below 1.
     """
     _require("triangle", "degree", degree)
     third, sixth = sp.Rational(1, 3), sp.Rational(1, 6)
@@ -142,9 +195,22 @@ def triangle(degree: int) -> QuadratureRule:
 
 
 def tetrahedron(degree: int) -> QuadratureRule:
-    """Rule on the unit tetrahedron for polynomials of a degree, at least.
+    """Return a rule on the unit tetrahedron.
 
-    Symmetric of 1 and 4 points up to degree 2, beyond that Gauss and Jacobi with collapsed sides.
+    Parameters
+    ----------
+    degree : int
+        Degree of polynomials that it integrates exactly.
+
+    Returns
+    -------
+    QuadratureRule
+        Symmetric, of 1 and 4 points, up to degree 2; Gauss and Jacobi with collapsed sides above.
+
+    Raises
+    ------
+    ValueError
+        The degree is below 1.
     """
     _require("tetrahedron", "degree", degree)
     if degree == 1:
@@ -157,7 +223,23 @@ def tetrahedron(degree: int) -> QuadratureRule:
 
 
 def wedge(degree: int) -> QuadratureRule:
-    """Rule on triangle x [-1, 1] for polynomials of a degree in each, at least."""
+    """Return a rule on the unit triangle times [-1, 1].
+
+    Parameters
+    ----------
+    degree : int
+        Degree of polynomials in each that it integrates exactly.
+
+    Returns
+    -------
+    QuadratureRule
+        Product of a triangle's and a line's rule.
+
+    Raises
+    ------
+    ValueError
+        The degree is below 1.
+    """
     flat, line = triangle(degree), _line(degree // 2 + 1)
     pairs = list(zip(flat.points, flat.weights, strict=True))
     points = tuple((*p, x) for p, _ in pairs for x, _ in line)

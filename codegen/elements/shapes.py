@@ -11,12 +11,38 @@ QUAD_NODES = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 
 def quad4(xi: Any, eta: Any) -> list[Any]:
-    """Bilinear shape functions N_a(xi, eta) on [-1, 1]^2."""
+    """Return the bilinear shape functions on [-1, 1]^2.
+
+    Parameters
+    ----------
+    xi : Expr
+        First coordinate.
+    eta : Expr
+        Second coordinate.
+
+    Returns
+    -------
+    list of Expr
+        N_a.
+    """
     return [(1 + a * xi) * (1 + b * eta) / 4 for a, b in QUAD_NODES]
 
 
 def quad4_gradient(xi: Any, eta: Any) -> list[tuple[Any, Any]]:
-    """(dN_a/dxi, dN_a/deta) of the bilinear shape functions."""
+    """Return the gradients of the bilinear shape functions.
+
+    Parameters
+    ----------
+    xi : Expr
+        First coordinate.
+    eta : Expr
+        Second coordinate.
+
+    Returns
+    -------
+    list of tuple of Expr
+        (dN_a/dxi, dN_a/deta).
+    """
     return [(a * (1 + b * eta) / 4, b * (1 + a * xi) / 4) for a, b in QUAD_NODES]
 
 
@@ -34,12 +60,42 @@ HEX_NODES = (
 
 
 def hex8(xi: Any, eta: Any, zeta: Any) -> list[Any]:
-    """Trilinear shape functions N_a(xi, eta, zeta) on [-1, 1]^3."""
+    """Return the trilinear shape functions on [-1, 1]^3.
+
+    Parameters
+    ----------
+    xi : Expr
+        First coordinate.
+    eta : Expr
+        Second coordinate.
+    zeta : Expr
+        Third coordinate.
+
+    Returns
+    -------
+    list of Expr
+        N_a.
+    """
     return [(1 + a * xi) * (1 + b * eta) * (1 + c * zeta) / 8 for a, b, c in HEX_NODES]
 
 
 def hex8_gradient(xi: Any, eta: Any, zeta: Any) -> list[tuple[Any, Any, Any]]:
-    """(dN_a/dxi, dN_a/deta, dN_a/dzeta) of the trilinear shape functions."""
+    """Return the gradients of the trilinear shape functions.
+
+    Parameters
+    ----------
+    xi : Expr
+        First coordinate.
+    eta : Expr
+        Second coordinate.
+    zeta : Expr
+        Third coordinate.
+
+    Returns
+    -------
+    list of tuple of Expr
+        (dN_a/dxi, dN_a/deta, dN_a/dzeta).
+    """
     return [
         (
             a * (1 + b * eta) * (1 + c * zeta) / 8,
@@ -51,13 +107,42 @@ def hex8_gradient(xi: Any, eta: Any, zeta: Any) -> list[tuple[Any, Any, Any]]:
 
 
 def line2(xi: Any) -> list[Any]:
-    """Linear shape functions (26) on [-1, 1]."""
+    """Return the linear shape functions (26) of the paper on [-1, 1].
+
+    Parameters
+    ----------
+    xi : Expr
+        Coordinate.
+
+    Returns
+    -------
+    list of Expr
+        N_a.
+    """
     half = sp.Rational(1, 2)
     return [half * (1 - xi), half * (1 + xi)]
 
 
 def interpolate(shape: Any, nodal: Any) -> Any:
-    """Sum over nodes of shape times nodal value."""
+    """Return the sum over nodes of shape function times nodal value.
+
+    Parameters
+    ----------
+    shape : list of Expr
+        Shape functions.
+    nodal : list of Expr
+        Values at the nodes.
+
+    Returns
+    -------
+    Expr
+        The sum.
+
+    Raises
+    ------
+    ValueError
+        The lists have different lengths.
+    """
     if len(shape) != len(nodal):
         raise ValueError(
             f"interpolate: {len(shape)} shape functions and {len(nodal)} nodal values; as many "

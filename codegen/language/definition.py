@@ -79,6 +79,69 @@ class Definition:
     """A finished model: arguments, potential and fields as graphs, nothing differentiated yet.
 
     Made by `Model.finish`; `softehl.load_kernel` and `Study.add` take it.
+
+    Attributes
+    ----------
+    name : str
+        Name of the model.
+    doc : str
+        Description.
+    nodes : int
+        Number of nodes.
+    coordinates : tuple of str
+        Components of the reference coordinates.
+    unknowns : tuple of str
+        Unknowns of the element.
+    interpolated : str or None
+        Field with any number of unknowns.
+    parameters, data, point_data : tuple of Argument
+        Further arguments with their meanings.
+    rule : QuadratureRule
+        Quadrature.
+    unroll : bool or None
+        Whether the loop over the points is written out; None: where it pays.
+    graph : Graph
+        The expressions.
+    potential : Node
+        Its gradient is the residual.
+    constant : tuple of Node
+        Values without variation.
+    given : mapping
+        Value -> derivatives in place of the true ones.
+    directions : tuple of Node
+        Unknowns by which the residual is derived.
+    interface : tuple of Node
+        Values through which derivatives are computed.
+    fields : tuple
+        Name and value of each field.
+    product, pseudo_load, fields_rate : bool
+        Further tasks; see `Model.offer`.
+    derivatives : tuple
+        Arguments by which the residual is differentiated.
+    example : tuple
+        Values near which the model makes sense.
+    tasks : tuple of str or None
+        Tasks that are generated; None: the usual ones.
+    conditions : tuple of Condition
+        Conditions on parameters and data.
+    components : int
+        Basis values of the interpolated field.
+    nodal : tuple
+        First unknown and number of components of fields with unknowns at all nodes.
+    places : tuple
+        Name and node of every unknown.
+    history : tuple of str
+        Point data with new values after a step.
+    internal : tuple of str
+        Unknowns of one element alone.
+    point_rates : bool
+        Whether point data have rates.
+    cell : str
+        Reference cell of a page of fields.
+    point : PointForm or None
+        The page at a point.
+    record : Record
+        The page as it was written, by which kernels are checked.
     """
 
     name: str

@@ -20,9 +20,18 @@ from softehl.codegen.language.model import Model
 
 @dataclass(frozen=True)
 class Isoparametric:
-    """Shape function gradients by the reference coordinates, [node][component], and Jacobian.
+    """Geometry at a point: gradients of the shape functions, and the Jacobian.
 
-    inverse: of the Jacobian `matrix`, (parent coordinate, reference coordinate).
+    Attributes
+    ----------
+    dN : list of list of Expr
+        Gradients by the reference coordinates, [node][component].
+    detJ : Expr
+        Determinant of the Jacobian.
+    inverse : Matrix
+        Inverse of the Jacobian, (coordinate of the cell, reference coordinate).
+    matrix : Matrix
+        The Jacobian.
     """
 
     dN: list[list[Any]]
@@ -32,10 +41,29 @@ class Isoparametric:
 
 
 def isoparametric(m: Model, X: Any, parent: Any, label: str = "") -> Isoparametric:
-    """Geometry at the point from nodal coordinates [component][node] and parent gradients.
+    """Return the geometry at the point, in one, two or three dimensions.
 
-    Works in one, two and three dimensions; `parent` is e.g. `shapes.hex8_gradient(xi, eta, zeta)`.
-    label: begins the names dX, detJ, dX_inverse and dN, for pages that use these names themselves.
+    Parameters
+    ----------
+    m : Model
+        The model.
+    X : list of list of Symbol
+        Reference coordinates, [component][node].
+    parent : list of tuple of Expr
+        Gradients of the shape functions in the cell, such as
+        `element("hex8").gradient(*m.point())`.
+    label : str
+        Begins the names dX, detJ, dX_inverse and dN, for pages that use these names.
+
+    Returns
+    -------
+    Isoparametric
+        Gradients and Jacobian.
+
+    Raises
+    ------
+    ModelError
+        The gradients or the rule belong to another cell.
     """
     size = len(X)
     _require_parent(m, size, parent)
@@ -75,7 +103,27 @@ def _require_parent(m: Model, size: int, parent: Any) -> None:
 
 
 def deformation_gradient(m: Model, dN: Any, u: Any) -> Any:
-    """Matrix F = 1 + Grad u, named F_00, F_01, ..., from displacements [component][node]."""
+    """Return F = 1 + Grad u, with the names F_00, F_01, ...
+
+    Parameters
+    ----------
+    m : Model
+        The model.
+    dN : list of list of Expr
+        Gradients of the shape functions, [node][component].
+    u : list of list of Symbol
+        Displacements, [component][node].
+
+    Returns
+    -------
+    Matrix
+        (dim, dim).
+
+    Raises
+    ------
+    ModelError
+        Displacements and gradients differ in dimension.
+    """
     size = len(u)
     widths = {len(row) for row in dN}
     if widths != {size}:
@@ -91,7 +139,15 @@ def deformation_gradient(m: Model, dN: Any, u: Any) -> Any:
 
 @dataclass(frozen=True)
 class Gradient:
-    """Axisymmetric deformation gradient: in-plane block `plane` (2x2) and `hoop` stretch."""
+    """Axisymmetric deformation gradient.
+
+    Attributes
+    ----------
+    plane : Matrix
+        Block (2, 2) of the section.
+    hoop : Expr
+        Hoop stretch.
+    """
 
     plane: Any
     hoop: Any
@@ -109,7 +165,21 @@ class Gradient:
 
 @dataclass(frozen=True)
 class Quad4:
-    """Geometry of the 4-node axisymmetric element at one parent point."""
+    """Geometry of the axisymmetric element of 4 nodes at a point.
+
+    Attributes
+    ----------
+    N : list of Expr
+        Shape functions.
+    dN : list of tuple of Expr
+        Their gradients by (Z, R).
+    R : Expr
+        Radius.
+    dX : list of list of Expr
+        Jacobian.
+    detJ : Expr
+        Its determinant.
+    """
 
     N: list[Any]
     dN: list[tuple[Any, Any]]
@@ -119,7 +189,26 @@ class Quad4:
 
 
 def quad4(m: Model, label: str, X: Any, xi: Any, eta: Any) -> Quad4:
-    """Shape functions, their gradients in (Z, R), radius and Jacobian at (xi, eta)."""
+    """Return the geometry of the axisymmetric element of 4 nodes at a point.
+
+    Parameters
+    ----------
+    m : Model
+        The model.
+    label : str
+        Part of the names of its values.
+    X : list of list of Symbol
+        Reference coordinates (Z, R), [component][node].
+    xi : Expr
+        First coordinate of the point in the cell.
+    eta : Expr
+        Second coordinate.
+
+    Returns
+    -------
+    Quad4
+        Shape functions, gradients, radius and Jacobian.
+    """
     N = [m.define(f"N{label}_{a}", n) for a, n in enumerate(shapes.quad4(xi, eta))]
     parent = shapes.quad4_gradient(xi, eta)
     J = [[shapes.interpolate([g[k] for g in parent], x) for k in range(2)] for x in X]
@@ -140,7 +229,28 @@ def quad4(m: Model, label: str, X: Any, xi: Any, eta: Any) -> Quad4:
 def gradient(
     m: Model, label: str, dN: Any, hoop_shape: Any, u: Any, *, interface: bool = True
 ) -> Gradient:
-    """F = 1 + Grad u, hoop stretch 1 + u_r / R with `hoop_shape` = N_a / R."""
+    """Return F = 1 + Grad u of an axisymmetric motion, with hoop stretch 1 + u_r / R.
+
+    Parameters
+    ----------
+    m : Model
+        The model.
+    label : str
+        Part of the names of its values.
+    dN : list of tuple of Expr
+        Gradients of the shape functions by (Z, R).
+    hoop_shape : list of Expr
+        N_a / R.
+    u : list of list of Symbol
+        Displacements, [component][node].
+    interface : bool
+        As in `Model.define`.
+
+    Returns
+    -------
+    Gradient
+        F.
+    """
     F = sp.Matrix(
         2, 2, lambda i, k: (1 if i == k else 0) + shapes.interpolate([g[k] for g in dN], u[i])
     )
@@ -152,7 +262,22 @@ def gradient(
 
 
 def invariants(m: Model, label: str, F: Gradient) -> tuple[Any, Any, Any]:
-    """I1bar, I2bar and I3 of (4)-(5); det B is the square of J, without expanding it."""
+    """Return the invariants of equations (4) and (5) of the paper.
+
+    Parameters
+    ----------
+    m : Model
+        The model.
+    label : str
+        Part of the names of their values.
+    F : Gradient
+        Deformation gradient.
+
+    Returns
+    -------
+    tuple of Expr
+        I1bar, I2bar, I3.
+    """
     B = F.plane * F.plane.T
     b = [m.define(f"B{label}_{k}", v) for k, v in enumerate((B[0, 0], B[1, 1], B[0, 1]))]
     bt = m.define(f"B{label}_t", F.hoop**2)
@@ -165,14 +290,44 @@ def invariants(m: Model, label: str, F: Gradient) -> tuple[Any, Any, Any]:
 
 
 def isochoric_right_cauchy_green(m: Model, label: str, F: Gradient) -> Any:
-    """J^(-2/3) F^T F (3, 3): the squares of its principal stretches have the product 1."""
+    """Return J^(-2/3) F^T F.
+
+    Parameters
+    ----------
+    m : Model
+        The model.
+    label : str
+        Part of the names of its values.
+    F : Gradient
+        Deformation gradient.
+
+    Returns
+    -------
+    Matrix
+        (3, 3); the squares of its principal stretches have the product 1.
+    """
     scale = m.define(f"J{label}_to_minus_two_thirds", (F.J**2) ** sp.Rational(-1, 3))
     C = sp.diag(scale * (F.plane.T * F.plane), scale * F.hoop**2)
     return m.define(f"C{label}", C)
 
 
 def cauchy(m: Model, W: Callable[[Gradient], Any], F: Gradient) -> tuple[Any, ...]:
-    """J and the Cauchy stress P F^T / J, P = dW/dF: J, sigma_zz, sigma_rr, sigma_tt, sigma_zr."""
+    """Return the volume ratio and the Cauchy stress P F^T / J, P = dW/dF.
+
+    Parameters
+    ----------
+    m : Model
+        The model.
+    W : callable
+        Function of a Gradient that returns the energy.
+    F : Gradient
+        Deformation gradient.
+
+    Returns
+    -------
+    tuple of Expr
+        J, sigma_zz, sigma_rr, sigma_tt, sigma_zr.
+    """
     plane, hoop = m.define("F_of_stress", F.plane), m.define("F_of_stress_t", F.hoop)
     F = Gradient(plane, hoop)
     *P, P_t = m.derivative("P", W(F), [*plane, hoop])

@@ -84,7 +84,7 @@ class Page:
     degree: int | None = None
     doc: str = ""
     form: Form | None = None
-    source: Callable[..., Any] | None = None
+    source: Callable[..., object] | None = None
 
     @property
     def code(self) -> CodeType:

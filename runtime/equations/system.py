@@ -180,7 +180,22 @@ class System:
     def committed(
         self, problem: Problem, x: Array, before: Mapping[str, Array]
     ) -> dict[str, Array]:
-        """Point data after a converged step: what pages call their history."""
+        """Return the history after a converged step.
+
+        Parameters
+        ----------
+        problem : Problem
+            Equations of the step.
+        x : array (n,)
+            Unknowns at its end.
+        before : mapping of str to array
+            History before it.
+
+        Returns
+        -------
+        dict of str to array (cells, points, k)
+            Block -> values.
+        """
         after = dict(before)
         for block in self.blocks.values():
             names = block.kernel.history
@@ -193,17 +208,43 @@ class System:
         return after
 
     def problem(self, step: Step) -> Problem:
-        """The equations of a step, as a solver sees them.
+        """Return the problem of a step, of all processes.
 
-        Raises StudyError as `part` does.
+        Parameters
+        ----------
+        step : Step
+            Load factor or time, rates and previous values.
+
+        Returns
+        -------
+        Problem
+            Equations with prescribed values.
+
+        Raises
+        ------
+        StudyError
+            Prescribed values contradict each other, or the study has changed since.
         """
         posed: Problem = self.share.posed(self.part(step))
         return posed
 
     def part(self, step: Step) -> Problem:
-        """The equations of a step, those of this process.
+        """Return the problem of a step, with the elements of this process.
 
-        Raises StudyError where prescribed values differ, or more was written down meanwhile.
+        Parameters
+        ----------
+        step : Step
+            Load factor or time, rates and previous values.
+
+        Returns
+        -------
+        Problem
+            Equations with prescribed values.
+
+        Raises
+        ------
+        StudyError
+            As of `problem`.
         """
         if self.statement is not None and self.statement.count != self.written:
             raise StudyError(

@@ -45,7 +45,7 @@ class Petsc:
         PETSc is not installed.
     """
 
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, object] = field(default_factory=dict)
     matrix_free: bool = False
     times: Times = field(default_factory=Times)
 

@@ -293,7 +293,7 @@ class Solver:
     of unknowns, for `-pc_type fieldsplit`.
     """
 
-    options: Mapping[str, Any]
+    options: Mapping[str, object]
     near: Any = None
     fields: Mapping[str, Integers] = field(default_factory=dict)
     times: Times = field(default_factory=Times)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -223,7 +223,7 @@ class Result:
         *,
         cells: str | None = None,
         block: str | None = None,
-    ) -> Any:
+    ) -> dict[str, Array]:
         """Return the unknowns, or fields of a block, along a straight line.
 
         Parameters

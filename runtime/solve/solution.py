@@ -161,7 +161,15 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A converged point of a branch; `solution.x` is kept for the last two points of a branch."""
+    """Converged point of a path.
+
+    Attributes
+    ----------
+    parameter : float
+        Load factor, time or another parameter.
+    solution : Solution
+        Unknowns, and the record of Newton's method.
+    """
 
     parameter: float
     solution: Solution

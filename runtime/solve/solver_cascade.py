@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.newton import Corrector, WarmStartable, norm_at
+from softehl.runtime.solve.newton import Corrector, NonlinearProblem, WarmStartable, norm_at
 from softehl.runtime.solve.solution import Solution
 
 
@@ -35,7 +35,7 @@ class Ladder:
         if not self.rungs:
             raise ValueError("a ladder needs at least one corrector")
 
-    def solve(self, problem: Any, x0: Array) -> Solution:
+    def solve(self, problem: NonlinearProblem, x0: Array) -> Solution:
         """Solve R(x) = 0.
 
         Parameters

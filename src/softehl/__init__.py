@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         Silent,
     )
     from softehl.cases.shipped import solve_cases
-    from softehl.codegen.abi import TargetError
+    from softehl.codegen.abi import BuildError, TargetError
     from softehl.codegen.elements import quadrature, shapes
     from softehl.codegen.elements.cells import Element, element
     from softehl.codegen.elements.quadrature import QuadratureRule
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from softehl.codegen.language.material import Law, Material, material
     from softehl.codegen.language.model import Model
     from softehl.codegen.language.weak_form import Page, page
-    from softehl.codegen.tools.build import BuildError
     from softehl.codegen.tools.cache_dir import CacheError
     from softehl.codegen.tools.model_text import ModelFileError
     from softehl.codegen.verify.random_states import NoStateError
@@ -157,7 +156,7 @@ _PUBLIC = {
     "solve_cases": "softehl.cases.shipped",
 }
 _MODELLING = {
-    "BuildError": "softehl.codegen.tools.build",
+    "BuildError": "softehl.codegen.abi",
     "CacheError": "softehl.codegen.tools.cache_dir",
     "Definition": "softehl.codegen.language.definition",
     "DifferentiationError": "softehl.codegen.graph.partial_derivatives",
