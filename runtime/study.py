@@ -13,20 +13,32 @@ Unknowns have the names that the pages give them; equal names on equal nodes are
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
-from softehl.runtime.arrays import Integers
+from softehl.runtime.analyses import arc_length_path, homogenisation, load_stepping, time_stepping
+from softehl.runtime.analyses import buckling as analyses_buckling
+from softehl.runtime.analyses import modes as analyses_modes
+from softehl.runtime.analyses.arc_length_path import LoadPath
+from softehl.runtime.analyses.bifurcation import Bifurcation
+from softehl.runtime.analyses.buckling import Buckling
+from softehl.runtime.analyses.callbacks import Series
+from softehl.runtime.analyses.homogenisation import Cell
+from softehl.runtime.analyses.solver_options import SolverOptions
+from softehl.runtime.analyses.time_integrators import MethodName, TimeIntegrator
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition import argument_checks as read
-from softehl.runtime.definition.block_options import elements_on, form_of
 from softehl.runtime.definition.contact_sides import touch
 from softehl.runtime.definition.element_blocks import (
     On,
     beside_of,
     elements_of,
+    elements_on,
+    form_of,
     geometry_of,
     kinds_of,
     page_on,
@@ -45,16 +57,28 @@ from softehl.runtime.definition.problem_definition import (
     shown,
 )
 from softehl.runtime.discretisation.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
-from softehl.runtime.fit.fitted import Fitted
+from softehl.runtime.equations.mass_matrix import Masses
+from softehl.runtime.equations.system import System
+from softehl.runtime.equations.system_builder import equations
+from softehl.runtime.fit import least_squares
+from softehl.runtime.fit import objective as inverse
+from softehl.runtime.fit.jax_operation import Operation
+from softehl.runtime.fit.least_squares import Bounds, Fit, Measured
+from softehl.runtime.fit.objective import Objective, Trials, varied_definition
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
-from softehl.runtime.paths import Paths
+from softehl.runtime.parallel.engine import AnyEngine
+from softehl.runtime.parallel.linear_solver_choice import Linear
+from softehl.runtime.results.result import Modes, Result
+from softehl.runtime.sensitivity.input_parsing import By
+from softehl.runtime.sensitivity.inputs import Key
+from softehl.runtime.solve.newton import Newton
 from softehl.runtime.suggestions import few, listed
 
 
 @dataclass(eq=False)
-class Study(Paths, Fitted):
+class Study:
     """Boundary-value problem on a mesh: pages, loads, supports; `solve` and others solve it.
 
     Parameters
@@ -103,15 +127,19 @@ class Study(Paths, Fitted):
 
     def __copy__(self) -> Study:
         """A study with the same statements so far, on the same mesh."""
-        other = object.__new__(type(self))
-        vars(other).update({**vars(self), "_statement": self._statement.copied()})
-        return other
+        return self._with_definition(self._statement.copied())
 
     def __deepcopy__(self, memo: object) -> Study:
         """As a copy: what was written down does not change."""
         return self.__copy__()
 
-    # the problem --------------------------------------------------------------------------------
+    def _with_definition(self, definition: Statement) -> Study:
+        """A study with the same geometry and another definition."""
+        other = object.__new__(type(self))
+        vars(other).update({**vars(self), "mesh": definition.mesh, "_statement": definition})
+        return other
+
+    # definition ---------------------------------------------------------------------------------
 
     def add(
         self,
@@ -440,6 +468,540 @@ class Study(Paths, Fitted):
         for name, value in values.items():
             found = read.datum("start", name, value, self.mesh.points[nodes])
             self._statement.start.append(Start(name, nodes, found))
+
+    # analyses -----------------------------------------------------------------------------------
+
+    def system(self, fields: Mapping[str, Sequence[str]] | None = None) -> System:
+        """Return the discrete equations of the study.
+
+        Parameters
+        ----------
+        fields : mapping of str to sequence of str, optional
+            Name of a field -> its unknowns, which are numbered node by node, the fields in this
+            order and before all other unknowns. Left out, each unknown is a field.
+
+        Returns
+        -------
+        System
+            Equations with their numbering of unknowns.
+
+        Raises
+        ------
+        StudyError
+            Statements contradict each other.
+        """
+        return equations(self._statement, fields)
+
+    def solve(
+        self,
+        *,
+        steps: int = 1,
+        until: float = 1.0,
+        start: Result | None = None,
+        options: SolverOptions | None = None,
+        newton: Newton | None = None,
+        on_step: Callable[[Result], object] | None = None,
+        engine: AnyEngine = None,
+        linear: Linear = "auto",
+        write: str | Path | Series | None = None,
+        progress: bool | None = None,
+        record: bool = False,
+    ) -> Result:
+        """Return the solution at load factor `until`, reached in load steps.
+
+        Parameters
+        ----------
+        steps : int
+            Number of load steps. They are cut where Newton's method fails, and grow again.
+        until : float
+            Load factor at the end.
+        start : Result, optional
+            A result of this or another study on the same mesh, which gives initial values, history
+            and load factor; the equations are those of this study. If `until` is its load factor,
+            the equations are solved there once.
+        options : SolverOptions, optional
+            The following arguments together; an argument that is given has precedence.
+        newton : Newton, optional
+            Settings of Newton's method.
+        on_step : callable, optional
+            Called with the Result of each converged step.
+        engine : str or object, optional
+            "serial", "petsc" (all processes of mpirun), or an engine with settings.
+        linear : str
+            Linear solver. "direct", "superlu" and "pardiso" factorise; "amg" is algebraic multigrid
+            (pyamg) for displacements or one scalar; "matrix-free" assembles no matrix; "auto"
+            selects by the size of the problem.
+        write : str or Path, optional
+            A .pvd file; each converged step is written as a .vtu beside it.
+        progress : bool, optional
+            Report each step on stderr. Left out: in one line, if stderr is a terminal.
+        record : bool
+            Keep the previous steps, which derivatives need if pages have history, and the last
+            factors of large problems.
+
+        Returns
+        -------
+        Result
+            The state at the end.
+
+        Raises
+        ------
+        StudyError
+            An argument is not allowed, or nothing prevents a rigid motion.
+        NotConverged
+            The end is not reached; its `reached` is the last Result, or None.
+        """
+        return load_stepping.solve(
+            self._statement,
+            steps=steps,
+            until=until,
+            start=start,
+            on_step=on_step,
+            options=SolverOptions.merged(
+                options,
+                newton=newton,
+                engine=engine,
+                linear=linear,
+                write=write,
+                progress=progress,
+                record=record,
+            ),
+        )
+
+    def march(
+        self,
+        *,
+        dt: float,
+        until: float,
+        method: MethodName | TimeIntegrator = "euler",
+        mass: Masses | None = None,
+        velocity: Mapping[str, Datum] | None = None,
+        rho_inf: float | None = None,
+        tolerance: float | None = None,
+        start: Result | None = None,
+        checkpoint: str | Path | None = None,
+        restart: str | Path | None = None,
+        options: SolverOptions | None = None,
+        newton: Newton | None = None,
+        engine: AnyEngine = None,
+        linear: Linear = "auto",
+        write: str | Path | None = None,
+        progress: bool | None = None,
+        record: bool = False,
+    ) -> Iterator[Result]:
+        """Yield the results of time steps up to `until`.
+
+        Parameters
+        ----------
+        dt : float
+            Length of a step, of the first one if steps adapt to `tolerance` [s].
+        until : float
+            Time at the end [s].
+        method : str or integrator
+            `Euler()` (backward) or `BDF2()`. With inertia: `GeneralisedAlpha(rho_inf)`,
+            `Newmark(beta, gamma)` (the trapezoidal rule), `Midpoint()` (conserves energy) or
+            `CentralDifference()` (explicit, with as many stable steps as a result needs); results
+            are then `Motion`. Short names: "euler", "bdf2", "generalised-alpha", "newmark",
+            "midpoint", "explicit".
+        mass : mapping, optional
+            Densities by block, as of `Result.modes`; for methods with inertia.
+        velocity : mapping of str to float or callable, optional
+            Unknown -> initial velocity, a number or a function of coordinates (n, dim); for methods
+            with inertia.
+        rho_inf : float, optional
+            Spectral radius of generalised-alpha at infinite frequency, in [0, 1]; 0.8 if left out.
+        tolerance : float, optional
+            Largest local error of a step, relative to the largest value of each unknown (of those
+            with a rate, if there are any). Steps adapt to it. Left out, they are `dt`, or shorter
+            where Newton's method fails.
+        start : Result, optional
+            State at the beginning, as in `solve`.
+        checkpoint : str or Path, optional
+            File that is rewritten after each step.
+        restart : str or Path, optional
+            A checkpoint of the same mesh, pages and unknowns. The march continues bitwise as if it
+            had not stopped, with engine "petsc" on any number of processes. Another `dt` than
+            before is the length of the next step.
+        options : SolverOptions, optional
+            The following arguments together; an argument that is given has precedence.
+        newton : Newton, optional
+            Settings of Newton's method.
+        engine : str or object, optional
+            As in `solve`.
+        linear : str
+            As in `solve`.
+        write : str or Path, optional
+            As in `solve`; with `start` or `restart` the series continues.
+        progress : bool, optional
+            As in `solve`.
+        record : bool
+            As in `solve`.
+
+        Yields
+        ------
+        Result
+            State after each step; a `Motion` with inertia.
+
+        Raises
+        ------
+        StudyError
+            An argument is not allowed, or belongs to another method.
+        NotConverged
+            As in `solve`.
+
+        Notes
+        -----
+        After each converged step history is committed, and values of the previous step (data u_old,
+        `Model.rates`) are renewed.
+        """
+        return time_stepping.march(
+            self._statement,
+            dt=dt,
+            until=until,
+            method=method,
+            mass=mass,
+            velocity=velocity,
+            rho_inf=rho_inf,
+            tolerance=tolerance,
+            start=start,
+            checkpoint=checkpoint,
+            restart=restart,
+            options=SolverOptions.merged(
+                options,
+                newton=newton,
+                engine=engine,
+                linear=linear,
+                write=write,
+                progress=progress,
+                record=record,
+            ),
+        )
+
+    def follow(
+        self,
+        *,
+        step: float,
+        until: Callable[[Result], bool],
+        start: Result | Bifurcation | None = None,
+        detect: Literal["bifurcation"] | None = None,
+        options: SolverOptions | None = None,
+        newton: Newton | None = None,
+        most: int = 1000,
+        linear: Linear = "auto",
+        write: str | Path | None = None,
+        progress: bool | None = None,
+    ) -> LoadPath:
+        """Return the path from load factor 0 on by arc length; it passes limit points of the load.
+
+        Parameters
+        ----------
+        step : float
+            Longest arc length of a step; the first is a hundredth of it.
+        until : callable
+            Called with each Result; the path ends where it returns True.
+        start : Result or Bifurcation, optional
+            A result to begin with, as in `solve`; or a bifurcation, whose other branch is followed
+            (`start.reversed`: to its other side).
+        detect : str, optional
+            "bifurcation": locate bifurcations, at the cost of a factorisation for each point. They
+            are in `bifurcations` of the path.
+        options : SolverOptions, optional
+            The following arguments together; an argument that is given has precedence.
+        newton : Newton, optional
+            Settings of Newton's method.
+        most : int
+            Largest number of points.
+        linear : str
+            A linear solver that factorises.
+        write : str or Path, optional
+            As in `solve`.
+        progress : bool, optional
+            As in `solve`.
+
+        Returns
+        -------
+        LoadPath
+            Results in order, limit points and bifurcations.
+
+        Raises
+        ------
+        StudyError
+            An argument is not allowed.
+        NotConverged
+            The end is not reached; its `reached` is the last Result, or None.
+
+        Notes
+        -----
+        The arc length counts the load factor, and the unknowns in units of their initial change per
+        load factor; from a bifurcation on, the load factor relative to that of the bifurcation and
+        displacements relative to the size of the mesh. Steps are cut where the path bends, so that
+        the path does not depend on `step` (docs/study.md). History is committed after each point.
+        """
+        return arc_length_path.follow(
+            self._statement,
+            step=step,
+            until=until,
+            start=start,
+            detect=detect,
+            most=most,
+            options=SolverOptions.merged(
+                options, newton=newton, linear=linear, write=write, progress=progress
+            ),
+        )
+
+    def periodic(self, *pairs: tuple[Where, Where], tolerance: float = 1e-6) -> Cell:
+        """Return the study as a unit cell of a periodic material.
+
+        Parameters
+        ----------
+        *pairs : tuple of two sides
+            Opposite sides, a pair for each direction.
+        tolerance : float
+            Largest distance of partner nodes after a shift, relative to the size of the sides.
+
+        Returns
+        -------
+        Cell
+            `solve(F)` of it gives the mean stress P and its tangent A.
+
+        Raises
+        ------
+        StudyError
+            Sides of a pair have different nodes.
+        """
+        return homogenisation.periodic_cell(self._statement, pairs, tolerance)
+
+    def modes(
+        self,
+        count: int = 6,
+        *,
+        mass: Masses | None = None,
+        start: Result | None = None,
+        options: SolverOptions | None = None,
+        engine: AnyEngine = None,
+        linear: Linear = "auto",
+    ) -> Modes:
+        """Return natural modes at rest, or about a state, the lowest first.
+
+        Parameters
+        ----------
+        count : int
+            Number of modes.
+        mass : mapping, optional
+            Densities by block, as of `Result.modes`.
+        start : Result, optional
+            State about which the modes are; at rest if left out.
+        options : SolverOptions, optional
+            The following arguments together; an argument that is given has precedence.
+        engine : str or object, optional
+            As in `solve`.
+        linear : str
+            As in `solve`.
+
+        Returns
+        -------
+        Modes
+            Frequencies and shapes. An unconstrained body has its rigid motions first, of frequency
+            zero: three in 2-D, six in 3-D.
+
+        Raises
+        ------
+        StudyError
+            The state is not in equilibrium, or the body has no mass.
+        """
+        return analyses_modes.modes(
+            self._statement,
+            count,
+            mass=mass,
+            start=start,
+            options=SolverOptions.merged(options, engine=engine, linear=linear),
+        )
+
+    def buckling(
+        self,
+        count: int = 1,
+        *,
+        start: Result | None = None,
+        options: SolverOptions | None = None,
+        newton: Newton | None = None,
+        engine: AnyEngine = None,
+    ) -> Buckling:
+        """Return the smallest load factors of linear buckling, with their modes.
+
+        Parameters
+        ----------
+        count : int
+            Number of factors.
+        start : Result, optional
+            State at which the tangent is linearised; at rest if left out. Factors are more exact
+            for a state near them.
+        options : SolverOptions, optional
+            The following arguments together; an argument that is given has precedence.
+        newton : Newton, optional
+            Settings of Newton's method.
+        engine : str or object, optional
+            As in `solve`.
+
+        Returns
+        -------
+        Buckling
+            Load factors, rising, and their modes.
+
+        Raises
+        ------
+        StudyError
+            An argument is not allowed, or nothing prevents a rigid motion.
+        NotConverged
+            The linear response is not found.
+
+        Notes
+        -----
+        The tangent changes as along the linear response to loads and prescribed values that grow in
+        proportion; a factor is where it becomes singular.
+        """
+        return analyses_buckling.buckling(
+            self._statement,
+            count,
+            start=start,
+            options=SolverOptions.merged(options, newton=newton, engine=engine),
+        )
+
+    def varied(self, values: Mapping[Key, float | Array]) -> Study:
+        """Return a copy of the study with other values of inputs.
+
+        Parameters
+        ----------
+        values : mapping
+            Input -> value, {("rubber", "mu"): 0.5}; keys as of `Result.sensitivity`. A function of
+            the study is multiplied by its value.
+
+        Returns
+        -------
+        Study
+            The copy.
+
+        Raises
+        ------
+        StudyError
+            The study has no such input, or a value has a wrong shape.
+        """
+        return self._with_definition(varied_definition(self._statement, values))
+
+    def objective(
+        self,
+        what: str | Callable[[Array], tuple[float, Array]],
+        *,
+        by: By,
+        at: tuple[float, ...] | None = None,
+        reaction: str | None = None,
+        **path: Any,
+    ) -> Objective:
+        """Return a quantity as a function of inputs (k,), with its gradient.
+
+        Optimisers of SciPy take it.
+
+        Parameters
+        ----------
+        what : str or callable
+            The quantity, as in `Result.sensitivity`.
+        by : mapping
+            The inputs, as in `Result.sensitivity`.
+        at : tuple of float, optional
+            As in `Result.sensitivity`.
+        reaction : str, optional
+            As in `Result.sensitivity`.
+        **path
+            Arguments of `solve`, or of `march` if there is a `dt`.
+
+        Returns
+        -------
+        Objective
+            Called with inputs (k,) it returns the value and its gradient (k,).
+
+        Raises
+        ------
+        StudyError
+            The study has no such input.
+        """
+        return inverse.objective(
+            self._statement, what, by=by, at=at, reaction=reaction, arguments=path
+        )
+
+    def in_jax(self, *, by: By, **path: Any) -> Operation:
+        """Return all unknowns as a function of inputs (k,), for JAX.
+
+        Parameters
+        ----------
+        by : mapping
+            The inputs, as in `Result.sensitivity`, one after the other; `start` of the operation
+            has their values.
+        **path
+            Arguments of `solve`, or of `march` if there is a `dt`.
+
+        Returns
+        -------
+        Operation
+            Function (k,) -> (n,) with an adjoint for `jax.grad`.
+
+        Raises
+        ------
+        StudyError
+            The study has no such input.
+        """
+        return Operation(Trials.by(self._statement, by, path))
+
+    def fit(
+        self,
+        measured: Measured,
+        *,
+        by: By,
+        bounds: Bounds | None = None,
+        sigma: float | Array | None = None,
+        most: int = 100,
+        **path: Any,
+    ) -> Fit:
+        """Fit inputs to measurements by least squares, from their present values on.
+
+        Parameters
+        ----------
+        measured : mapping
+            {(48, 60): {"u_y": 12.4}, "left": {"u_x": 0.3}}: unknowns at places, reactions at sides.
+            A number is measured at the end; a list has a number for each step; a mapping is
+            {load factor or time: number}.
+        by : mapping
+            The inputs, as in `Result.sensitivity`.
+        bounds : mapping, optional
+            Input -> (lower, upper), {("rubber", "mu"): (0, 1)}. Positive parameters and data of
+            pages stay positive, unless their bounds allow other values.
+        sigma : float or array, optional
+            Standard deviation of the measurements, one for all or one for each. Left out, all have
+            the same weight, and the covariance follows from the residuals.
+        most : int
+            Largest number of evaluations.
+        **path
+            Arguments of `solve`, or of `march` if there is a `dt`.
+
+        Returns
+        -------
+        Fit
+            Values, their covariance, residuals, and the last result.
+
+        Raises
+        ------
+        StudyError
+            The study has no such input, or the path no step at the time of a measurement.
+        NotConverged
+            The study has no solution for the present values.
+        """
+        return least_squares.fit(
+            self._statement,
+            measured,
+            by=by,
+            bounds=bounds,
+            sigma=sigma,
+            most=most,
+            arguments=path,
+        )
 
     @property
     def _ring(self) -> bool:

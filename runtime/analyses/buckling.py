@@ -1,21 +1,32 @@
-"""Linear buckling of a study."""
+"""Linear buckling: load factors at which the linearly extrapolated tangent is singular."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy.sparse import csc_array
 
-from softehl.runtime.analyses.initial_state import Beginning
+from softehl.runtime.analyses.initial_state import initial_state
+from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.arrays import Array, read_only
+from softehl.runtime.definition.problem_definition import Statement, StudyError
 from softehl.runtime.discretisation.problem import Problem
-from softehl.runtime.equations.eigenproblems import buckled
+from softehl.runtime.equations.eigenproblems import SymmetricTangent, require_count
 from softehl.runtime.equations.rigid_body_modes import require_held
 from softehl.runtime.equations.system import System
 from softehl.runtime.results.result import ModeShape, Result
+from softehl.runtime.solve.eigen import NoModes
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
 from softehl.runtime.suggestions import few
+
+_LENGTH = 1e-4
+"""Of the size of the mesh: how far the difference of tangents of `buckling` goes. Its error is
+about the square of that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,20 +49,61 @@ class Buckling:
         return f"<Buckling: factors {few(f'{f:.6g}' for f in self.factors)}>"
 
 
-def linear_buckling(system: System, start: Beginning, count: int, newton: Newton) -> Buckling:
-    """Factors and modes of `Study.buckling`.  Raises StudyError, NotConverged."""
-    t, x0, histories = start
+def buckling(
+    definition: Statement,
+    count: int = 1,
+    *,
+    start: Result | None = None,
+    options: SolverOptions,
+) -> Buckling:
+    """Return the smallest load factors of linear buckling; see `Study.buckling`."""
+    prepared = options.prepare(definition)
+    system, newton = prepared.system, prepared.newton
+    initial = initial_state(system, start)
 
     def problem_at(factor: float) -> Problem:
-        return system.problem(system.still(factor, x0, histories))
+        return system.problem(system.still(factor, initial.x, initial.histories))
 
     with np.errstate(all="ignore"):
-        problem = problem_at(t)
-        require_held(system, problem, x0)
-        solution = newton.solve(problem, x0)
+        problem = problem_at(initial.t)
+        require_held(system, problem, initial.x)
+        solution = newton.solve(problem, initial.x)
     if not solution.converged:
         raise NotConverged(solution)
-    point = Point(t, solution)
-    state = Result(system, problem, point, histories)
-    factors, modes = buckled(system, problem_at, point, count, newton)
+    point = Point(initial.t, solution)
+    state = Result(system, problem, point, initial.histories)
+    factors, modes = _buckling_modes(system, problem_at, point, count, newton)
     return Buckling(read_only(factors), tuple(ModeShape.of(state, mode) for mode in modes))
+
+
+def _buckling_modes(
+    system: System, problem_at: Callable[[float], Any], state: Point, count: int, newton: Newton
+) -> tuple[Array, Array]:
+    """Load factors (k,) and modes (k, n) of linear buckling from a state x at load factor t.
+
+    newton: whose linear solver finds the response.
+
+    The tangent K changes by K' along the linear response to a load that grows by 1:
+    (K + (f - t) K') mode = 0.
+    """
+    words = f"buckling({count})"
+    require_count(words, count)
+    share, t, x = system.share, state.parameter, state.solution.x
+    here = SymmetricTangent.at(system, problem_at(t), x, words)
+    r, K = problem_at(t + 1.0).linearise(x)
+    try:
+        response = -newton.linear.factorise(K).solve(r)
+    except SingularMatrix as error:
+        raise StudyError(f"{words}: {error}") from None
+    most = share.largest(float(np.abs(response).max(initial=0.0)))
+    if not most > 0.0:
+        raise StudyError(f"{words}: nothing changes with the load factor; give loads or fix(...)")
+    h = _LENGTH * share.largest(float(np.ptp(system.mesh.points, axis=0).max())) / most
+    ahead = SymmetricTangent.at(system, problem_at(t + h), x + h * response, words).K
+    behind = SymmetricTangent.at(system, problem_at(t - h), x - h * response, words).K
+    change = csc_array((ahead - behind) / (2.0 * h))
+    try:
+        factors, found = share.buckling(here.problem, here.K, change, count)
+    except (NoModes, SingularMatrix) as error:
+        raise StudyError(f"{words}: {error}") from None
+    return t + factors, found

@@ -1,4 +1,4 @@
-"""Treatment of every converged result: shown on a terminal, written to files, handed on."""
+"""Callbacks after each converged step: progress on a terminal, files, functions of the user."""
 
 from __future__ import annotations
 
@@ -75,11 +75,11 @@ def read_series(path: Path) -> list[tuple[float, str]]:
 
 @dataclass(eq=False)
 class Progress:
-    """One line on the terminal that tells where a path is; a line for each step elsewhere.
+    """Progress line on the terminal; a line for each step elsewhere, and in the log.
 
-    name: of what grows, such as "load factor", from `begin` to `until` (None: it is not known).
-    inplace: rewrite the one line. note: gives what is said at the end of each. shown: on the
-    terminal; what is not goes to the log alone.
+    name: of what grows, such as "load factor", from `begin` to `until` (None: unknown). inplace:
+    rewrite the one line. note: returns words for the end of the line. shown: on stderr; else steps
+    are in the log alone.
     """
 
     name: str
@@ -91,8 +91,22 @@ class Progress:
     steps: int = 0
     since: float = field(default_factory=time.monotonic)
 
+    @classmethod
+    def on_stderr(
+        cls,
+        shown: bool | None,
+        name: str,
+        begin: float,
+        until: float | None,
+        *,
+        note: Callable[[], str],
+    ) -> Progress:
+        """Return progress on stderr; shown: None if that is a terminal."""
+        terminal = sys.stderr.isatty()
+        return cls(name, begin, until, terminal, note, terminal if shown is None else shown)
+
     def __call__(self, result: Result) -> None:
-        """Tell of one more step."""
+        """Report one more step."""
         if not self.steps and result.t == self.begin:
             return  # where the path begins
         self.steps += 1
@@ -111,15 +125,15 @@ class Progress:
         sys.stderr.flush()
 
     def close(self) -> None:
-        """Leave the line as it is."""
+        """End the line."""
         if self.shown and self.inplace and self.steps:
             sys.stderr.write("\n")
 
 
-class Watch:
-    """Everyone who is told of a converged result; a context, at whose end the line is left.
+class Callbacks:
+    """Callbacks after each converged step; as a context manager it closes the progress line.
 
-    progress: tell of steps on stderr; None: where that is a terminal. write: a `.pvd` file.
+    write: a `.pvd` file.
     """
 
     def __init__(
@@ -130,44 +144,22 @@ class Watch:
     ) -> None:
         self._progress = progress
         series = Series(Path(write)) if isinstance(write, str | Path) else write
-        self._told: list[OnStep] = [f for f in (series, progress, on_step) if f is not None]
+        self._callbacks: list[OnStep] = [f for f in (series, progress, on_step) if f is not None]
 
     def __call__(self, result: Result) -> None:
-        for f in self._told:
-            f(result)
+        for callback in self._callbacks:
+            callback(result)
 
-    def __enter__(self) -> Watch:
+    def __enter__(self) -> Callbacks:
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._progress is not None:
             self._progress.close()
 
-
-def watched(results: Iterator[Result], watch: Watch) -> Iterator[Result]:
-    """The results, each of which `watch` is told of before it is given."""
-    with watch:
-        for result in results:
-            watch(result)
-            yield result
-
-
-@dataclass(frozen=True)
-class Telling:
-    """Who wants to be told: `wanted` or not, None where there is a terminal; only the first process
-    `speaks`. name: of what grows, begin: where from. note: on the linear solver.
-    """
-
-    wanted: bool | None
-    speaks: bool
-    name: str
-    begin: float
-    note: Callable[[], str] = str
-
-    def until(self, end: float | None) -> Progress | None:
-        """Progress up to an end, shown where it is wanted; None on the other processes."""
-        if not self.speaks:
-            return None
-        terminal = sys.stderr.isatty()
-        shown = terminal if self.wanted is None else self.wanted
-        return Progress(self.name, self.begin, end, terminal, self.note, shown)
+    def around(self, results: Iterator[Result]) -> Iterator[Result]:
+        """Yield the results, each after its callbacks."""
+        with self:
+            for result in results:
+                self(result)
+                yield result

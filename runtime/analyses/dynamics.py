@@ -1,171 +1,363 @@
-"""The beginning of a motion, and the march of a study by a method of second order."""
+"""Dynamics: a march with inertia, its consistent initial state, and implicit steps."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from softehl.runtime.analyses.equations_of_motion import Body
-from softehl.runtime.analyses.explicit_dynamics import explicit
-from softehl.runtime.analyses.implicit_dynamics import Implicit, Phase
-from softehl.runtime.analyses.initial_state import beginning
-from softehl.runtime.analyses.motion import Motion
-from softehl.runtime.analyses.time_integrators import METHODS, Backward, Scheme, scheme_of
+from softehl.runtime.analyses.explicit_dynamics import ExplicitMarch
+from softehl.runtime.analyses.initial_state import SMALLEST, initial_state
+from softehl.runtime.analyses.motion import (
+    Forces,
+    Ledger,
+    Motion,
+    MotionState,
+    parameter_work,
+    stored_energy,
+)
+from softehl.runtime.analyses.solver_options import SolverOptions
+from softehl.runtime.analyses.time_integrators import (
+    ROUNDING,
+    Affine,
+    BackwardEulerDynamics,
+    CentralDifference,
+    SecondOrderIntegrator,
+    step_before_end,
+)
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.argument_checks import datum, known
-from softehl.runtime.definition.problem_definition import Datum, StudyError
+from softehl.runtime.definition.problem_definition import Datum, Statement, StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.system import Step, System
 from softehl.runtime.results.result import Result
+from softehl.runtime.solve.continuation import (
+    End,
+    PathLog,
+    StepAttempt,
+    Stepper,
+    StepRule,
+    path_points,
+)
 from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import NotConverged, Point, Solution, Status
 
-_MOMENT = 1e-6  # of a step: how fast supports move at the start is a difference over that
-_SHORT = 0.1  # of a step: shorter ones find a consistent start, but for an error of this order
+_SUPPORT_STEP = 1e-6  # of a step: the initial velocity of supports is a difference over that
+_CONSISTENT_STEP = 0.1  # of a step: shorter ones find a consistent start, with this error
 _SLOW = 0.01
-"""Of the time 1 / w of the fastest motion of the mesh: such short steps move places by an error of
+"""Of the time 1 / w of the fastest motion of the mesh: such short steps move nodes by an error of
 the square of that, relative to what accelerations do. At 0.1 a slow load on a stiff body began with
 1e-2 of the accelerations in error; smaller ones lose digits.
 """
 
 
-@dataclass(frozen=True)
-class Motions:
-    """A march of second order as it was asked for; see `Study.march`."""
+def march_with_inertia(
+    definition: Statement,
+    integrator: SecondOrderIntegrator | CentralDifference,
+    *,
+    dt: float,
+    until: float,
+    options: SolverOptions,
+    mass: Masses | None = None,
+    velocity: Mapping[str, Datum] | None = None,
+    start: Result | None = None,
+) -> Iterator[Result]:
+    """Return the motions of steps with inertia.  Raises StudyError, NotConverged."""
+    prepared = options.prepare(definition)
+    system, newton = prepared.system, prepared.newton
+    initial = initial_state(system, start)
+    if until <= initial.t:
+        raise StudyError(f"until = {until:g}: must be after the start, which is t = {initial.t:g}")
+    v = _initial_velocities(system, start, velocity or {})
+    state = MotionState(initial.t, initial.x, v, np.zeros_like(initial.x), initial.histories)
+    at_rest = Step(state.t, 1.0, state.x, 0.0, v, dt, state.histories)
+    implicit = None if isinstance(integrator, CentralDifference) else integrator
+    body = Body.of(system, mass, implicit, at_rest)
+    if isinstance(integrator, CentralDifference):
+        state = _with_supports(body, state, body.at_end(at_rest, v), dt)
+        motions = ExplicitMarch.of(integrator, dt, body, state).run(until)
+    elif isinstance(start, Motion) and not velocity and _continues(body, start, integrator):
+        motions = _continued(ImplicitMarch(integrator, dt, newton), body, start, state, until)
+    else:
+        problem = body.at_end(at_rest, v)
+        state = _with_supports(body, state, problem, dt)
+        state = _consistent_state(body, state, problem, dt, newton)
+        motions = ImplicitMarch(integrator, dt, newton).run(body, state, until)
+    return prepared.callbacks("t", initial.t, until).around(motions)
 
-    method: str
-    dt: float
-    newton: Newton
-    mass: Masses | None = None
-    velocity: Mapping[str, Datum] | None = None
-    rho_inf: float | None = None
 
-    def run(self, system: System, start: Result | None, until: float) -> Iterator[Motion]:
-        """Results of the steps.  Raises StudyError, NotConverged."""
-        scheme = scheme_of(self.method, self.rho_inf)
-        t, x, histories = beginning(system, start)
-        if until <= t:
-            raise StudyError(f"until = {until:g}: must be after the start, which is t = {t:g}")
-        v = self._velocities(system, start)
-        rest = Step(t, 1.0, x, 0.0, v, self.dt, histories)
-        body = Body.of(system, self.mass, scheme, rest)
-        if (
-            scheme is not None
-            and isinstance(start, Motion)
-            and self._goes_on(system, start, scheme)
-        ):
-            run = Implicit(scheme, self.dt, self.newton).run
-            if system.share.pieces[1] > 1:  # of which each has its own unknowns
-                a = _nodal_rates(system, start, start.acceleration)
-                return run(body, Phase(t, x, v, a, histories), until)
-            here = Phase(t, start.x, start.v, start.a, histories)
-            return run(body, here, until, system.share.part(start.problem))
-        problem = body.at_end(rest, v)
-        x = problem.admissible(x)
-        soon = system.part(Step(t + _MOMENT * self.dt, 1.0, x, 0.0, v, self.dt, histories))
-        v[problem.fixed] = (soon.values - problem.values) / (_MOMENT * self.dt)
-        v[~body.heavy] = 0.0
-        here = Phase(t, x, v, np.zeros_like(x), histories)
-        if scheme is None:
-            problem = body.at_end(here.standing(self.dt), v)
-            return explicit(self.dt, body, here, problem).started(problem, until)
-        if system.share.largest(float(body.constrained.any())):
-            here = self._consistent(system, body, here)
-        elif system.share.largest(float(body.algebraic(problem).any())):
-            here = replace(here, x=self._balanced(body, problem, x))
-        problem = body.at_end(here.standing(self.dt), here.v)
-        begin = replace(here, a=body.started(problem, here.x))
-        return Implicit(scheme, self.dt, self.newton).run(body, begin, until)
-
-    def _goes_on(self, system: System, start: Motion, scheme: Scheme) -> bool:
-        """True if the start is a motion of the same study by the same scheme, which goes on as if
-        it had not stopped.
-        """
-        if start.scheme != scheme or self.velocity:
-            return False
-        before = start.system
-        same = before.statement is system.statement and before.written == system.written
-        if start.mass is not self.mass and repr(start.mass) != repr(self.mass):
-            return False
-        return same and system.statement is not None
-
-    def _consistent(self, system: System, body: Body, here: Phase) -> Phase:
-        """The beginning that supports, ties and contacts admit, with the unknowns without mass.
-
-        Of three short steps of backward Euler the first finds the places, the second, again with
-        the given velocities, the velocities, and the third the forces.
-        """
-        h = min(_SHORT * self.dt, _SLOW / body.fastest(here.standing(self.dt)))
-        short = Body.of(system, self.mass, Backward(), here.standing(self.dt))
-        place, _ = self._short(short, here, h)
-        second, v = self._short(short, replace(place, v=here.v), h)
-        third, after = self._short(short, replace(second, v=v), h)
-        x = np.where(body.heavy, place.x - h * v, third.x)
-        return replace(here, x=x, v=2.0 * v - after)
-
-    def _balanced(self, body: Body, problem: Problem, x: Array) -> Array:
-        """Unknowns x, (n,), in which those without mass satisfy their equations."""
-        moving = np.flatnonzero(body.heavy)
-        fixed = np.union1d(problem.fixed, moving)
-        asked = replace(problem, fixed=fixed, values=x[fixed])
-        with np.errstate(all="ignore"):
-            solution = self.newton.solve(body.share.posed(asked), x)
-        return solution.x if solution.converged else x
-
-    def _short(self, body: Body, here: Phase, h: float) -> tuple[Phase, Array]:
-        """The end of a step of length h, and the velocities there.  Raises StudyError."""
-        state = (h, here.x, here.v, here.a)
-        rate, inertial = Backward().rate(*state), body.masked(Backward().inertial(*state))
-        step = replace(
-            here.step(here.t + h),
-            rate=rate.c,
-            rest=rate.rest,
-            acceleration=inertial.c,
-            remainder=inertial.rest,
-        )
-        problem = body.moving.share.posed(body.problem(step, 1.0, 0.0 * here.x))
-        with np.errstate(all="ignore"):
-            solution = self.newton.solve(problem, here.x)
-        if not solution.converged:
-            raise StudyError(
-                f"t = {here.t:.6g}: no accelerations at the start go with its supports, ties and "
-                f"contacts: {solution.message}"
-            )
-        v = np.where(body.heavy, rate.at(solution.x), 0.0)
-        return replace(here, t=here.t + h, x=solution.x), v
-
-    def _velocities(self, system: System, start: Result | None) -> Array:
-        """Velocities at the start, (n,): those of `start`, and those that are given."""
-        found, nodal = np.zeros(system.size), system.numbering.nodal
-        if isinstance(start, Motion):
-            found = _nodal_rates(system, start, start.velocity)
-        given = self.velocity or {}
-        known("unknown", given, nodal, "velocity")
-        for name, numbers in nodal.items():
-            there = numbers >= 0
-            if name in given:
-                places = system.mesh.points[there]
-                found[numbers[there]] = datum("velocity", name, given[name], places)
-        return found
+def _initial_velocities(system: System, start: Result | None, given: Mapping[str, Datum]) -> Array:
+    """Velocities at the start, (n,): those of `start`, and those that are given."""
+    v, nodal = np.zeros(system.size), system.numbering.nodal
+    if isinstance(start, Motion):
+        v = _nodal_rates(system, start, start.velocity)
+    known("unknown", given, nodal, "velocity")
+    for name, dofs in nodal.items():
+        mask = dofs >= 0
+        if name in given:
+            v[dofs[mask]] = datum("velocity", name, given[name], system.mesh.points[mask])
+    return v
 
 
 def _nodal_rates(system: System, start: Motion, rates: Callable[[str], Array]) -> Array:
     """Rates (n,) of the unknowns of a system, by their names at the nodes of a motion."""
-    found = np.zeros(system.size)
-    for name, numbers in system.numbering.nodal.items():
+    values = np.zeros(system.size)
+    for name, dofs in system.numbering.nodal.items():
         if name in start.system.numbering.nodal:
-            there = numbers >= 0
-            found[numbers[there]] = np.nan_to_num(rates(name)[there])
+            mask = dofs >= 0
+            values[dofs[mask]] = np.nan_to_num(rates(name)[mask])
+    return values
+
+
+def _continues(body: Body, start: Motion, integrator: SecondOrderIntegrator) -> bool:
+    """True if the start is a motion of the same study by the same integrator: it continues as if
+    it had not stopped.
+    """
+    system, previous = body.plain, start.system
+    if start.scheme != integrator:
+        return False
+    if start.mass is not body.mass and repr(start.mass) != repr(body.mass):
+        return False
+    same = previous.statement is system.statement and previous.written == system.written
+    return same and system.statement is not None
+
+
+def _continued(
+    march: ImplicitMarch, body: Body, start: Motion, state: MotionState, until: float
+) -> Iterator[Motion]:
+    """Continue a motion with its accelerations and forces."""
+    system = body.plain
+    if system.share.pieces[1] > 1:  # of which each has its own unknowns
+        a = _nodal_rates(system, start, start.acceleration)
+        return march.run(body, replace(state, a=a), until)
+    state = replace(state, x=start.x, v=start.v, a=start.a)
+    return march.run(body, state, until, system.share.part(start.problem))
+
+
+def _with_supports(body: Body, state: MotionState, problem: Problem, dt: float) -> MotionState:
+    """The state with prescribed values and their velocities; massless unknowns have none."""
+    x, v, step = problem.admissible(state.x), state.v.copy(), _SUPPORT_STEP * dt
+    later = body.plain.part(Step(state.t + step, 1.0, x, 0.0, state.v, dt, state.histories))
+    v[problem.fixed] = (later.values - problem.values) / step
+    v[~body.heavy] = 0.0
+    return replace(state, x=x, v=v)
+
+
+def _consistent_state(
+    body: Body, state: MotionState, problem: Problem, dt: float, newton: Newton
+) -> MotionState:
+    """The state with unknowns without mass and multipliers in equilibrium, and accelerations.
+
+    problem: equations without inertia at the state.
+    """
+    if body.share.largest(float(body.constrained.any())):
+        state = _constrained_state(body, state, dt, newton)
+    elif body.share.largest(float(body.algebraic(problem).any())):
+        state = replace(state, x=_massless_equilibrium(body, problem, state.x, newton))
+    problem = body.at_end(state.ended_step(dt), state.v)
+    return replace(state, a=body.started(problem, state.x))
+
+
+def _constrained_state(body: Body, state: MotionState, dt: float, newton: Newton) -> MotionState:
+    """The state that supports, ties and contacts admit, with the unknowns without mass.
+
+    Of three short steps of backward Euler the first finds the displacements, the second, again with
+    the given velocities, the velocities, and the third the forces.
+    """
+    h = min(_CONSISTENT_STEP * dt, _SLOW / body.fastest(state.ended_step(dt)))
+    short = Body.of(body.plain, body.mass, BackwardEulerDynamics(), state.ended_step(dt))
+    first, _ = _backward_euler_step(short, state, h, newton)
+    second, v = _backward_euler_step(short, replace(first, v=state.v), h, newton)
+    third, later_v = _backward_euler_step(short, replace(second, v=v), h, newton)
+    x = np.where(body.heavy, first.x - h * v, third.x)
+    return replace(state, x=x, v=2.0 * v - later_v)
+
+
+def _massless_equilibrium(body: Body, problem: Problem, x: Array, newton: Newton) -> Array:
+    """Unknowns x, (n,), in which those without mass satisfy their equations."""
+    fixed = np.union1d(problem.fixed, np.flatnonzero(body.heavy))
+    massless = replace(problem, fixed=fixed, values=x[fixed])
+    with np.errstate(all="ignore"):
+        solution = newton.solve(body.share.posed(massless), x)
+    return solution.x if solution.converged else x
+
+
+def _backward_euler_step(
+    body: Body, state: MotionState, h: float, newton: Newton
+) -> tuple[MotionState, Array]:
+    """The end of a step of length h, and the velocities there.  Raises StudyError."""
+    integrator = BackwardEulerDynamics()
+    step, velocity = _implicit_step(integrator, body, state, h)
+    problem = body.moving.share.posed(body.problem(step, 1.0, 0.0 * state.x))
+    with np.errstate(all="ignore"):
+        solution = newton.solve(problem, state.x)
+    if not solution.converged:
+        raise StudyError(
+            f"t = {state.t:.6g}: no accelerations at the start go with its supports, ties and "
+            f"contacts: {solution.message}"
+        )
+    v = np.where(body.heavy, velocity.at(solution.x), 0.0)
+    return replace(state, t=state.t + h, x=solution.x), v
+
+
+def _implicit_step(
+    integrator: SecondOrderIntegrator, body: Body, state: MotionState, dt: float
+) -> tuple[Step, Affine]:
+    """A step of length dt from a state, and the velocity in its equation."""
+    velocity = integrator.equation_velocity(dt, state)
+    acceleration = body.masked(integrator.equation_acceleration(dt, state))
+    step = replace(
+        state.step(state.t + dt),
+        rate=velocity.c,
+        rest=velocity.rest,
+        acceleration=acceleration.c,
+        remainder=acceleration.rest,
+    )
+    return step, velocity
+
+
+@dataclass(frozen=True)
+class ImplicitMarch:
+    """March by an implicit integrator: length of step, Newton's method."""
+
+    integrator: SecondOrderIntegrator
+    dt: float
+    newton: Newton
+
+    def run(
+        self, body: Body, state: MotionState, until: float, end: Problem | None = None
+    ) -> Iterator[Motion]:
+        """Yield each converged step.  Raises NotConverged.
+
+        end: equations without inertia of the step that ended at the state, if there was one.
+        """
+        ledger, log = Ledger(body.share), PathLog("t")
+        stepper = _ImplicitStepper(self, body, state, until, ledger, equations=end)
+        for _ in path_points(stepper, StepRule(self.dt, SMALLEST * self.dt), log):
+            log.points = log.points[-1:]
+            if stepper.result is not None:
+                yield stepper.result
+        if not log.branch().converged:
+            raise NotConverged(log.branch(), stepper.result)
+
+
+@dataclass(eq=False)
+class _ImplicitStepper(Stepper):
+    """Stepper of an implicit march; holds the last state.
+
+    equations: at the state, without inertia. forces, supports: there, (n,), without ties and
+    contacts, and without averaged ones.
+    """
+
+    march: ImplicitMarch
+    body: Body
+    state: MotionState
+    until: float
+    ledger: Ledger
+    result: Motion | None = None
+    equations: Problem | None = None
+    forces: Forces | None = None
+    supports: Array = field(default_factory=lambda: np.empty(0))
+    _attempt: Step | None = None
+
+    def start(self) -> StepAttempt:
+        """See `Stepper`."""
+        state, dt = self.state, self.march.dt
+        end = self.equations or self.body.at_end(state.ended_step(dt), state.v)
+        self._set_state(end, state, Forces.of(end, state.x, self.body.roles))
+        self._energies(end)
+        return StepAttempt.solved(state.t, state.x, dt)
+
+    def attempt(self, step: float) -> StepAttempt:
+        """A step in time."""
+        state, body, integrator = self.state, self.body, self.march.integrator
+        dt = step_before_end(self.until - state.t, step)
+        time_step, _ = _implicit_step(integrator, body, state, dt)
+        assert self.forces is not None
+        initial_forces = integrator.initial_weight * self.forces.total
+        problem = body.problem(time_step, integrator.load_time, initial_forces)
+        newton, distributed = self.march.newton, body.moving.share.posed(problem)
+        x = body.weighted(state.x, 1.0 / body.weight)
+        with np.errstate(all="ignore"):
+            solution = newton.solve(distributed, x + dt * state.v)
+            if not solution.converged:  # it may be beyond what the body admits
+                solution = newton.solve(distributed, x)
+        solution = replace(solution, x=body.weighted(solution.x, body.weight))
+        self._attempt = time_step
+        next_step = min(2.0 * dt, self.march.dt) if solution.converged else 0.5 * dt
+        return StepAttempt(time_step.t, solution, dt, next_step)
+
+    def accept(self, attempt: StepAttempt) -> None:
+        """Commit history and the state, and add up the work of the step."""
+        if self._attempt is None:
+            return
+        previous, body, step, x = self.state, self.body, self._attempt, attempt.solution.x
+        integrator = self.march.integrator
+        acceleration = integrator.acceleration(step.dt, previous).at(x)
+        v = np.where(body.heavy, integrator.velocity(step.dt, previous).at(x), 0.0)
+        a = np.where(body.heavy, acceleration, 0.0)
+        end = body.at_end(step, v)
+        histories = body.plain.committed(end, x, previous.histories)
+        initial_forces, supports, initial_equations = self.forces, self.supports, self.equations
+        state = MotionState(step.t, x, v, a, histories)
+        self._set_state(end, state, Forces.of(end, x, body.roles))
+        assert initial_forces is not None
+        assert initial_equations is not None
+        assert self.forces is not None
+        middle = None
+        if integrator.averages_forces:
+            without_inertia = replace(step, acceleration=0.0, remainder=None)
+            middle = body.problem(without_inertia, integrator.load_time, 0.0 * x)
+            mean = Forces.of(middle, x, body.roles)
+            supports = _at_supports(end, mean.total + body.M @ acceleration)
+        else:
+            mean = initial_forces.mean(self.forces)
+            supports = 0.5 * (supports + self.supports)
+        supports = supports + _at_supports(end, mean.constraints)
+        displacement = x - previous.x
+        self.ledger.add(mean, supports, displacement)
+        self.ledger.others += body.friction(end, x, displacement)
+        self.ledger.external += parameter_work(
+            initial_equations, end, body.roles, (previous.x, x), middle
+        )
+        self.result = self._motion(end, state, attempt.solution)
+
+    def end(self) -> End | None:
+        """See `Stepper`."""
+        if self.until - self.state.t > ROUNDING * abs(self.until):
+            return None
+        return Status.CONVERGED, f"reached t = {self.state.t:.9g}"
+
+    def _set_state(self, end: Problem, state: MotionState, forces: Forces) -> None:
+        self.state, self.equations, self.forces = state, end, forces
+        self.supports = _at_supports(end, forces.total + self.body.M @ state.a)
+
+    def _energies(self, end: Problem) -> dict[str, float]:
+        v, x = self.state.v, self.state.x
+        kinetic = 0.5 * float(v @ (self.body.M @ v))
+        stored = stored_energy(end, x, self.body.roles)
+        assert self.forces is not None
+        return self.ledger.told(self.state.t, kinetic, stored, self.forces, x)
+
+    def _motion(self, end: Problem, state: MotionState, solution: Solution) -> Motion:
+        return Motion(
+            self.body.plain,
+            self.body.share.posed(end.at(state.x)),
+            Point(state.t, solution),
+            state.histories,
+            v=state.v,
+            a=state.a,
+            energy=self._energies(end),
+            scheme=self.march.integrator,
+            mass=self.body.mass,
+        )
+
+
+def _at_supports(problem: Problem, forces: Array) -> Array:
+    """Forces (n,) of supports: those on prescribed unknowns."""
+    found = np.zeros_like(forces)
+    found[problem.fixed] = forces[problem.fixed]
     return found
-
-
-def require_no_inertia(method: str, system: System) -> None:
-    """Raise StudyError where a page has accelerations."""
-    for block in system.blocks.values():
-        if block.accelerations:
-            raise StudyError(
-                f'{block.name!r} has accelerations, method = "{method}" has none: allowed are '
-                + ", ".join(f'"{name}"' for name in METHODS)
-            )

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.analyses.motion import Forces, Roles
-from softehl.runtime.analyses.time_integrators import Affine, Scheme
+from softehl.runtime.analyses.time_integrators import Affine, SecondOrderIntegrator
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.contact.search import TouchingProblem
 from softehl.runtime.definition.problem_definition import Block, StudyError
@@ -108,7 +108,9 @@ class Body:
     constrained: Flags = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     @classmethod
-    def of(cls, system: System, mass: Masses | None, scheme: Scheme | None, at: Step) -> Body:
+    def of(
+        cls, system: System, mass: Masses | None, integrator: SecondOrderIntegrator | None, at: Step
+    ) -> Body:
         """Raises StudyError where there is no mass, or where a rate belongs to none."""
         problem, blocks = system.part(at), mass_blocks(system, mass)
         share, M = system.share, mass_matrix(system, problem, at.old, mass)
@@ -121,14 +123,19 @@ class Body:
                         f"{block.name!r} has a rate of {slot.name}, which has no mass everywhere: "
                         'give it one, or march by "euler" or "bdf2"'
                     )
-        roles, weight = Roles.in_system(system), 1.0 if scheme is None else scheme.weight()
+        roles, weight = (
+            Roles.in_system(system),
+            1.0 if integrator is None else integrator.final_weight,
+        )
         own = list(system.assembler.blocks)
         massless = _multipliers(system, problem, at.old, heavy, roles)
-        if scheme is not None and scheme.averaged:
+        if integrator is not None and integrator.averages_forces:
             free = [b for b in own if roles.of[b.name] not in ("tie", "contact")]
             changed = {b.name: _averaged(b, system.blocks.get(b.name), massless) for b in free}
             own = [changed.get(b.name, b) for b in own]
-        elif scheme is not None and not scheme.damps and share.largest(float(massless.any())):
+        elif (
+            integrator is not None and not integrator.damps and share.largest(float(massless.any()))
+        ):
             raise StudyError(
                 f"{_name_of(system, massless)} is a multiplier, whose error grows in steps of "
                 'method = "newmark" or of rho_inf = 1, which damp nothing: take '
@@ -143,7 +150,7 @@ class Body:
         rows = rows[heavy[rows]][:, None]
         before = ElementBlock(_BEFORE, _Known(), np.empty((0, 0)), rows, check_orientation=False)
         assembler = Assembler.build(system.size, [*own, *blocks, before])
-        lumps = _lumped(system, M, blocks) if scheme is None else M.diagonal()
+        lumps = _lumped(system, M, blocks) if integrator is None else M.diagonal()
         moving = replace(system, assembler=assembler, contacts=contacts, share=share.renewed())
         constrained = massless.copy()
         constrained[roles.multipliers] = True

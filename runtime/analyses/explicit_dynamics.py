@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from softehl.runtime.analyses.equations_of_motion import Body
-from softehl.runtime.analyses.implicit_dynamics import Phase
 from softehl.runtime.analyses.motion import (
     Forces,
     Ledger,
     Motion,
+    MotionState,
     parameter_work,
     stored_energy,
 )
-from softehl.runtime.analyses.time_stepping import ROUNDING
+from softehl.runtime.analyses.time_integrators import ROUNDING, CentralDifference
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.communicator import ConstraintMap
@@ -33,7 +33,7 @@ _APART = 1e-9  # of the size of the mesh: a tie that opens by more does not hold
 
 
 @dataclass(eq=False)
-class Explicit:
+class ExplicitMarch:
     """Steps of at most SAFE times the stable one, which is looked at in each result.
 
     dt: from result to result. free: what supports and ties leave, and masses there.
@@ -41,14 +41,28 @@ class Explicit:
 
     dt: float
     body: Body
-    here: Phase
+    here: MotionState
     free: ConstraintMap
     masses: Array
+    integrator: CentralDifference
+
+    @classmethod
+    def of(
+        cls, integrator: CentralDifference, dt: float, body: Body, state: MotionState
+    ) -> ExplicitMarch:
+        """From a state with velocities.  Raises StudyError where an unknown needs a mass."""
+        problem = body.at_end(state.ended_step(dt), state.v)
+        _require_lumped_masses(body, problem)
+        free = body.share.free(problem)
+        march = cls(dt, body, state, free, free.gather(body.lumps), integrator)
+        a = march._accelerations(Forces.of(problem, state.x, body.roles).total)
+        march.here = replace(state, a=a)
+        return march
 
     def run(self, until: float) -> Iterator[Motion]:
         """Results every dt until the end.  Raises StudyError, NotConverged."""
-        body, ledger = self.body, Ledger(self.body.share)
-        begin = body.at_end(self.here.standing(self.dt), self.here.v)
+        ledger = Ledger(self.body.share)
+        begin = self.body.at_end(self.here.ended_step(self.dt), self.here.v)
         self._told(begin, ledger)
         end, stable = begin, self._stable(begin)
         count = max(int(np.ceil((until - self.here.t) / self.dt * (1.0 - ROUNDING))), 1)
@@ -61,18 +75,11 @@ class Explicit:
             stable = self._stable(end)
             yield self._motion(end, ledger, steps, stable)
 
-    def started(self, problem: Problem, until: float) -> Iterator[Motion]:
-        """From rest or a state of which the accelerations are not known yet."""
-        here = self.here
-        a = self._accelerations(Forces.of(problem, here.x, self.body.roles).total)
-        self.here = Phase(here.t, here.x, here.v, a, here.histories)
-        return self.run(until)
-
     def _step(self, before: Problem, t: float, ledger: Ledger) -> Problem:
         """Velocity Verlet: the equations at the end of a step."""
         here, body = self.here, self.body
         dt = t - here.t
-        half = here.v + 0.5 * dt * here.a
+        half = self.integrator.half_step(dt, here.v, here.a)
         x = here.x + dt * half
         end = body.at_end(here.step(t), half)
         x[end.fixed] = end.values
@@ -92,9 +99,9 @@ class Explicit:
         supports[end.fixed] = (total + inertia)[end.fixed]
         ledger.add(old.mean(forces), supports, moved)
         ledger.external += parameter_work(before, end, body.roles, (here.x, x), None)
-        v = half + 0.5 * dt * a
+        v = self.integrator.half_step(dt, half, a)
         histories = body.plain.committed(end, x, here.histories)
-        self.here = Phase(t, x, v, a, histories)
+        self.here = MotionState(t, x, v, a, histories)
         return end
 
     def _accelerations(self, forces: Array) -> Array:
@@ -112,7 +119,7 @@ class Explicit:
 
         begin = np.random.default_rng(share.pieces[0]).uniform(-1.0, 1.0, len(root))
         found = highest(scaled, begin, share.dot, _ACCURATE)
-        return 2.0 / np.sqrt(found) if found > 0.0 else self.dt / SAFE
+        return self.integrator.stable_step(found) if found > 0.0 else self.dt / SAFE
 
     def _told(self, end: Problem, ledger: Ledger) -> dict[str, float]:
         kinetic = 0.5 * float(self.body.lumps @ self.here.v**2)
@@ -139,8 +146,8 @@ class Explicit:
         )  # fmt: skip
 
 
-def explicit(dt: float, body: Body, here: Phase, problem: Problem) -> Explicit:
-    """From a state.  Raises StudyError where an unknown has no mass that needs one."""
+def _require_lumped_masses(body: Body, problem: Problem) -> None:
+    """Raise StudyError where an unknown has no mass that needs one."""
     system, share = body.plain, body.share
     without = share.added(body.lumps) <= 0.0
     for block in problem.assembler.blocks:
@@ -165,5 +172,3 @@ def explicit(dt: float, body: Body, here: Phase, problem: Problem) -> Explicit:
                 f'method = "explicit": {name} has no mass everywhere, and explicit steps are '
                 "force over mass; an implicit method can do without"
             )
-    free = share.free(problem)
-    return Explicit(dt, body, here, free, free.gather(body.lumps))

@@ -23,6 +23,7 @@ from softehl.runtime.definition import argument_checks as read
 from softehl.runtime.definition.problem_definition import Statement, StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
+from softehl.runtime.equations.system_builder import equations
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.continuation import Continuation, StepRule
@@ -298,10 +299,11 @@ class Reduced:
         return worst
 
 
-def periodic(
-    statement: Statement, system: System, pairs: Sequence[tuple[Any, Any]], tolerance: float
+def periodic_cell(
+    definition: Statement, pairs: Sequence[tuple[Any, Any]], tolerance: float
 ) -> Cell:
-    """The cell of a study.  Raises StudyError, MeshError."""
+    """Return a study as a periodic cell; see `Study.periodic`."""
+    system = equations(definition)
     system.mesh.require_whole("periodic")
     mesh, nodal = system.mesh, system.numbering.nodal
     names = [f"u_{axis}" for axis in _AXES[: mesh.dimension]]
@@ -313,10 +315,10 @@ def periodic(
             f"periodic: {len(pairs)} pairs of sides; a mesh in {mesh.dimension}-D needs "
             f"{mesh.dimension}"
         )
-    if statement.conditions:
+    if definition.conditions:
         raise StudyError(
-            f"periodic: {statement.conditions[0].words}: the cell is moved by F alone, and held by "
-            "itself; leave fix out"
+            f"periodic: {definition.conditions[0].words}: the cell is moved by F alone, and held "
+            "by itself; leave fix out"
         )
     images, shifts = _images(mesh, pairs, tolerance)
     volume = float(abs(np.linalg.det(shifts)))

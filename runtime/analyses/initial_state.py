@@ -1,8 +1,8 @@
-"""Beginning of a path: at rest, or at the values of a result, matched by node and name."""
+"""Initial state of a path: at rest, or the values of a result, matched by node and name."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,12 +18,18 @@ shorter.
 """
 _NEAR = 1e-9  # of the size of a mesh: nodes closer than that are the same
 
-Beginning: TypeAlias = tuple[float, Array, dict[str, Array]]
-"""Time or load factor, unknowns (n,) of this process, and its point data by block."""
+
+@dataclass(frozen=True, eq=False)
+class InitialState:
+    """Time or load factor, unknowns (n,) of this process, and its point data by block."""
+
+    t: float
+    x: Array
+    histories: dict[str, Array]
 
 
-def beginning(system: System, start: Result | None) -> Beginning:
-    """From what a path goes on.
+def initial_state(system: System, start: Result | None) -> InitialState:
+    """Return the initial state of a load or time path.
 
     start: a result, of this study or of another one on the same mesh; only its values are taken.
     Unknowns without a node and histories are matched by the names of blocks. A multiplier of a tie
@@ -31,7 +37,7 @@ def beginning(system: System, start: Result | None) -> Beginning:
     where the result does not fit.
     """
     if start is None:
-        return 0.0, system.at_rest(), system.histories()
+        return InitialState(0.0, system.at_rest(), system.histories())
     if not isinstance(start, Result):
         raise StudyError(f"start is a {type(start).__name__}: a result is needed, as solve() gives")
     whole, before = system.everywhere, start.system.everywhere
@@ -41,7 +47,8 @@ def beginning(system: System, start: Result | None) -> Beginning:
     _take_nodal(whole, before, x, values)
     _take_others(whole, before, x, values)
     share = system.share
-    return start.t, share.own(x), share.own_state(_histories(whole, before, start.state))
+    histories = share.own_state(_histories(whole, before, start.state))
+    return InitialState(start.t, share.own(x), histories)
 
 
 def _same(a: Mesh, b: Mesh) -> bool:

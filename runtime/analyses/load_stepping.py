@@ -1,72 +1,43 @@
-"""Paths of a study in its load factor: load steps, and arc length where the load may turn back."""
+"""Load stepping: the solution at a load factor, reached in steps that are cut where they fail."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from softehl.runtime.analyses.bifurcation import Bifurcation, Detector
-from softehl.runtime.analyses.initial_state import SMALLEST, Beginning
-from softehl.runtime.arrays import Array, Flags
-from softehl.runtime.discretisation.loads import Tie
+from softehl.runtime.analyses.initial_state import SMALLEST, InitialState, initial_state
+from softehl.runtime.analyses.solver_options import SolverOptions
+from softehl.runtime.arrays import Array, count_of
+from softehl.runtime.definition.argument_checks import finite, function
+from softehl.runtime.definition.problem_definition import Statement, StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.rigid_body_modes import require_held
 from softehl.runtime.equations.stability import warn_unstable
 from softehl.runtime.equations.system import Step, System
 from softehl.runtime.results.result import Result
-from softehl.runtime.sensitivity.tape import Trail
-from softehl.runtime.solve.arclength import Arclength
+from softehl.runtime.sensitivity.tape import Trail, continued
 from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.linear.factorisation_cache import iterating
-from softehl.runtime.solve.linear.linear_solver import LinearSolver, SingularMatrix
-from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.linear.linear_solver import LinearSolver
 from softehl.runtime.solve.singularity_check import LastFactorisation, SupportCheck
-from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point, Status
+from softehl.runtime.solve.solution import Branch, NotConverged, Point
 
-_NAME = "load factor"
-_KEPT = 100_000
+LOAD_FACTOR = "load factor"
+_FEW_UNKNOWNS = 100_000
 """Unknowns: the factors of fewer take some 200 MB at most, and an adjoint then costs an eighth of a
 nonlinear solution instead of a third."""
 
 
-@dataclass(frozen=True, eq=False)
-class LoadPath:
-    """Path of `Study.follow`: converged results in order, limit points, bifurcations.
-
-    Attributes
-    ----------
-    results : tuple of Result
-        The points of the path.
-    limits : tuple
-        Points at which the load factor turns, each with `t` (the load factor), `kind` ("maximum"
-        or "minimum") and `x`.
-    bifurcations : tuple of Bifurcation
-        In order, if `detect="bifurcation"`.
-    """
-
-    results: tuple[Result, ...]
-    limits: tuple[LimitPoint, ...]
-    bifurcations: tuple[Bifurcation, ...] = ()
-
-    def __repr__(self) -> str:
-        """Summary in one line."""
-        ends = [result.t for result in (*self.results[:1], *self.results[-1:])]
-        return (
-            f"<LoadPath: {len(self.results)} results, {_NAME} "
-            f"{' to '.join(f'{t:.6g}' for t in ends)}; {len(self.limits)} limits, "
-            f"{len(self.bifurcations)} bifurcations>"
-        )
-
-
 @dataclass(eq=False)
-class _Reached:
-    """A study on its path: after each point history is committed, and `on_step` is told.
+class LoadHistory:
+    """Converged points of a path in the load factor; each commits history and calls `on_step`.
 
-    x, histories: after the last point. results: all of them, or the last one. kept: the
-    linear solver, whose last factors are kept. before: what the first step goes on from. record:
-    results know the steps before them.
+    x, histories: after the last point. results: all of them, or the last one. memory: linear
+    solver with its last factors. previous: tape before the first step. record: results have the
+    tape of the previous steps.
     """
 
     system: System
@@ -74,27 +45,40 @@ class _Reached:
     histories: dict[str, Array]
     on_step: Callable[[Result], object]
     keep_all: bool = False
-    kept: LastFactorisation | None = None
-    before: Trail | None = None
+    memory: LastFactorisation | None = None
+    previous: Trail | None = None
     record: bool = False
     linear: LinearSolver | None = None
     results: list[Result] = field(default_factory=list)
+
+    @classmethod
+    def begin(
+        cls, system: System, initial: InitialState, on_step: Callable[[Result], object], **more: Any
+    ) -> LoadHistory:
+        """Return the history at an initial state."""
+        return cls(system, initial.x, initial.histories, on_step, **more)
 
     def problem_at(self, t: float) -> Problem:
         """The problem at a load factor."""
         return self.system.problem(self._step(t))
 
-    def keep(self, point: Point) -> None:
-        """Go on from a converged point."""
+    def commit(self, point: Point) -> None:
+        """Commit a converged point."""
         step = self._step(point.parameter)
         problem = self.system.problem(step)
-        before = self.results[-1].trail if self.results else self.before
+        previous = self.results[-1].trail if self.results else self.previous
         self.x = point.solution.x
         self.histories = self.system.committed(problem, self.x, self.histories)
         problem = problem.at(self.x)
-        earlier = before if self.record else None
-        known = earlier, self.kept, None if self.linear is None else iterating(self.linear)
-        trail = Trail(self.system, step, problem, self.x, *known)
+        trail = Trail(
+            self.system,
+            step,
+            problem,
+            self.x,
+            before=previous if self.record else None,
+            kept=self.memory,
+            linear=None if self.linear is None else iterating(self.linear),
+        )
         result = Result(self.system, problem, point, self.histories, trail)
         if not self.keep_all:
             self.results.clear()
@@ -110,135 +94,54 @@ class _Reached:
             raise NotConverged(branch, self.results[-1] if self.results else None)
 
 
-@dataclass(frozen=True, eq=False)
-class LoadSteps:
-    """Settings of load steps: their number; each result is handed to `on_step`.
+def solve(
+    definition: Statement,
+    *,
+    steps: int = 1,
+    until: float = 1.0,
+    start: Result | None = None,
+    on_step: Callable[[Result], object] | None = None,
+    options: SolverOptions,
+) -> Result:
+    """Return the result at load factor `until`; see `Study.solve`."""
+    count = count_of(steps)
+    if count is None:
+        raise StudyError(f"steps = {steps!r}: a whole number of at least 1 is needed")
+    until = finite("until", until)
+    if on_step is not None:
+        function("on_step", on_step, "result")
+    prepared = options.prepare(definition)
+    system = prepared.system
+    initial = initial_state(system, start)
+    first_step = SupportCheck(prepared.newton)
+    with prepared.callbacks(LOAD_FACTOR, initial.t, until, on_step) as callbacks:
+        history = LoadHistory.begin(
+            system,
+            initial,
+            callbacks,
+            memory=first_step.memory if options.record or system.size <= _FEW_UNKNOWNS else None,
+            previous=continued(system, start.trail if start else None),
+            record=options.record,
+            linear=prepared.newton.linear,
+        )
 
-    record: whether results keep the steps before them. before: what the first goes on from.
-    """
+        def commit(point: Point) -> None:
+            first_step.check(history.problem_at(point.parameter), point.solution)
+            history.commit(point)
 
-    steps: int
-    newton: Newton
-    on_step: Callable[[Result], object]
-    record: bool = False
-    before: Trail | None = None
-
-    def run(self, system: System, start: Beginning, until: float) -> Result:
-        """The result at load factor `until`.  Raises NotConverged."""
-        begin, x0, histories = start
-        first_step = SupportCheck(self.newton)
-        kept = first_step.memory if self.record or system.size <= _KEPT else None
-        kinds = kept, self.before, self.record, self.newton.linear
-        at = _Reached(system, x0, histories, self.on_step, False, *kinds)
-
-        def keep(point: Point) -> None:
-            first_step.check(at.problem_at(point.parameter), point.solution)
-            at.keep(point)
-
-        first = abs(until - begin) / self.steps or 1.0  # nowhere to go: one solution there
+        # without a way to go the equations are solved once
+        first = abs(until - initial.t) / count or 1.0
         with np.errstate(all="ignore"):
-            require_held(system, at.problem_at(begin + (until - begin) / self.steps), x0)
+            ahead = history.problem_at(initial.t + (until - initial.t) / count)
+            require_held(system, ahead, initial.x)
         rule = StepRule(first, min(SMALLEST, first), first)
-        path = Continuation(first_step.newton, rule, name=_NAME)
-        at.require_end(path.follow(at.problem_at, begin, until, x0, on_point=keep))
-        end = at.results[-1]
-        words = f"{_NAME} {end.t:.4g}"
-        near = first_step.last if end.iterations else None  # else they are of a step before
-        if near is not None or system.size <= _KEPT:  # factors for this alone may be too large
-            warn_unstable(end.problem, end.point.solution.x, near, words)
-        return end
-
-
-@dataclass(frozen=True, eq=False)
-class Arc:
-    """Beginning of a path by arc length: load factor, unknowns (n,), and how it leaves (n + 1,)."""
-
-    begin: float
-    x: Array
-    leave: Array | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class ArcSteps:
-    """Settings of a path by arc length: longest step, points at most; each result is handed to
-    `on_step`. detect: look for bifurcations.
-    """
-
-    step: float
-    newton: Newton
-    most: int
-    on_step: Callable[[Result], object]
-    detect: bool = False
-
-    def run(self, system: System, start: Beginning, until: Callable[[Result], bool]) -> LoadPath:
-        """Path of `Study.follow`.  Raises NotConverged."""
-        begin, x0, histories = start
-        at, first_step = (
-            _Reached(system, x0, histories, self.on_step, True),
-            SupportCheck(self.newton),
-        )
-        problem = at.problem_at(begin)
-        with np.errstate(all="ignore"):
-            require_held(system, problem, x0)
-            first = first_step.newton.solve(problem, x0)
-        if not first.converged:
-            raise NotConverged(first)
-        try:
-            probe = replace(self._path(1.0), newton=first_step.newton)
-            response = probe.response(at.problem_at, begin, first.x)
-        except SingularMatrix as error:
-            words = f"at the start of the path: {error}"
-            raise NotConverged(replace(first, status=Status.SINGULAR, message=words)) from None
-        first_step.check(problem, first)
-        counted = _counted(system)
-        scale = float(np.sqrt(np.mean(response[counted] ** 2))) or 1.0
-        return self._followed(at, self._path(_scales(counted, scale)), Arc(begin, first.x), until)
-
-    def leave(
-        self, system: System, start: Beginning, other: Bifurcation, until: Callable[[Result], bool]
-    ) -> LoadPath:
-        """The branch that leaves a bifurcation.  Raises NotConverged."""
-        begin, x0, histories = start
-        at = _Reached(system, x0, histories, self.on_step, True)
-        size = float(np.ptp(system.mesh.points, axis=0).max())
-        mode = other.mode.x
-        counted = _counted(system)
-        scale = size * float(np.sqrt(np.mean(mode[counted] ** 2)))
-        path = self._path(_scales(counted, scale), abs(begin) or 1.0)
-        return self._followed(at, path, Arc(begin, x0, np.append(mode, 0.0)), until)
-
-    def _path(self, x_scale: Array | float, parameter_scale: float = 1.0) -> Arclength:
-        rule = StepRule(1e-2 * self.step, 1e-6 * self.step, self.step)
-        return Arclength(
-            *(self.newton, rule, x_scale, parameter_scale), max_points=self.most, name=_NAME
-        )
-
-    def _followed(
-        self, at: _Reached, path: Arclength, arc: Arc, until: Callable[[Result], bool]
-    ) -> LoadPath:
-        detector = Detector(at.system, self.newton, skip=arc.leave is not None)
-
-        def ends(branch: Branch) -> bool:
-            if self.detect:
-                detector.look(at.results, branch)
-            return until(at.results[-1])
-
-        branch = path.follow(
-            at.problem_at, arc.begin, arc.x, until=ends, leave=arc.leave, on_point=at.keep
-        )
-        at.require_end(branch)
-        return LoadPath((*at.results,), branch.limit_points, (*detector.found,))
-
-
-def _counted(system: System) -> Flags:
-    """Unknowns (n,) that count in the length of a path: all but the forces of ties."""
-    found: Flags = np.ones(system.size, dtype=bool)
-    for block in system.assembler.blocks:
-        if isinstance(block.kernel, Tie):
-            found[block.dofs[:, 2]] = False
-    return found
-
-
-def _scales(counted: Flags, scale: float) -> Array | float:
-    """The scale of each unknown (n,), infinite for those that do not count."""
-    return scale if counted.all() else np.where(counted, scale, np.inf)
+        path = Continuation(first_step.newton, rule, name=LOAD_FACTOR)
+        branch = path.follow(history.problem_at, initial.t, until, initial.x, on_point=commit)
+        history.require_end(branch)
+    end = history.results[-1]
+    # the factors of a solution without iterations are those of the previous step
+    factors = first_step.last if end.iterations else None
+    if factors is not None or system.size <= _FEW_UNKNOWNS:  # for this alone they may be too large
+        x = end.point.solution.x
+        warn_unstable(end.problem, x, factors, f"{LOAD_FACTOR} {end.t:.4g}")
+    return end

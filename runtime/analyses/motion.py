@@ -17,7 +17,7 @@ from softehl.runtime.discretisation.loads import DeadLoad, NodalForce, Pressure,
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.contact_setup import contact_blocks
 from softehl.runtime.equations.mass_matrix import Masses
-from softehl.runtime.equations.system import System
+from softehl.runtime.equations.system import Step, System
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.results.result import Result
 from softehl.runtime.suggestions import listed, meant
@@ -107,6 +107,25 @@ class Motion(Result):
                 f"no unknown {name!r}{meant(name, nodal)}; at nodes: {listed(nodal)}"
             )
         return np.where(nodal[name] >= 0, values[nodal[name]], np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class MotionState:
+    """Time, unknowns x, velocities v, accelerations a (n,) of a motion, and its point data."""
+
+    t: float
+    x: Array
+    v: Array
+    a: Array
+    histories: Mapping[str, Array]
+
+    def step(self, t: float) -> Step:
+        """A step to t in which nothing moves yet."""
+        return Step(t, 1.0, self.x, 0.0, self.v, t - self.t, self.histories)
+
+    def ended_step(self, dt: float) -> Step:
+        """The present, as the end of a step of length dt with the present velocities."""
+        return Step(self.t, 1.0, self.x - dt * self.v, 0.0, self.v, dt, self.histories)
 
 
 Role: TypeAlias = Literal["load", "energy", "work", "tie", "contact", "none"]

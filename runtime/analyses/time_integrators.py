@@ -1,21 +1,24 @@
-"""Schemes in time for M a + f(u, v) = F: what they make of accelerations and velocities."""
+"""Integrators in time: backward Euler and BDF2; with inertia Newmark, generalised-alpha, midpoint.
+
+An integrator is a value, `march(method=BDF2())`; a string is its short name. First-order ones give
+du/dt = c u + rest at the end of a step. Second-order ones give the velocity and the acceleration
+in M a + f(u, v) = F in the same form.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from inspect import signature
+from typing import Any, ClassVar, Literal, Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.suggestions import meant
 
-Method: TypeAlias = Literal["generalised-alpha", "newmark", "midpoint", "explicit"]
-METHODS: tuple[Method, ...] = ("generalised-alpha", "newmark", "midpoint", "explicit")
-DAMPED = 0.8
-"""Spectral radius at infinite frequency of generalised-alpha, unless it is given: a fifth of the
-amplitude of what the mesh cannot resolve is lost in each step.
-"""
+ROUNDING = 1e-12  # of the whole time: a step is not cut to less than that before the end
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,15 +32,125 @@ class Affine:
         """Its value, (n,)."""
         return self.c * u + self.rest
 
-    def mixed(self, share: float, other: Array, of_other: float) -> Affine:
-        """share times this one, and of_other times a vector."""
-        return Affine(share * self.c, share * self.rest + of_other * other)
+    def combined(self, factor: float, vector: Array, vector_factor: float) -> Affine:
+        """factor times this one, plus vector_factor times a vector."""
+        return Affine(factor * self.c, factor * self.rest + vector_factor * vector)
+
+
+class Kinematics(Protocol):
+    """Unknowns x, velocities v and accelerations a, (n,) each."""
+
+    @property
+    def x(self) -> Array: ...
+
+    @property
+    def v(self) -> Array: ...
+
+    @property
+    def a(self) -> Array: ...
+
+
+@runtime_checkable
+class FirstOrderIntegrator(Protocol):
+    """Backward difference formula for du/dt."""
+
+    name: ClassVar[str]
+    order: ClassVar[int]
+
+    def weights(self, steps: Sequence[float]) -> Array:
+        """Weights of d/dt at the newest time, newest first.
+
+        steps: lengths of the last steps, the newest first, `order` of them or fewer at the start.
+        """
+        ...
+
+    def error_fraction(self, dt: float, two_steps: float) -> float:
+        """Local error, as a fraction of the difference from the extrapolated previous states.
+
+        two_steps: length of the step dt and of the previous one together.
+        """
+        ...
+
+
+@runtime_checkable
+class SecondOrderIntegrator(Protocol):
+    """Implicit formulas for velocities and accelerations.
+
+    averages_forces: forces are means along the step. damps: fast motions lose amplitude.
+    load_time: fraction of the step at whose end loads are evaluated. initial_weight: factor of the
+    forces at the beginning of a step in its equation. final_weight: of those at its end.
+    """
+
+    name: ClassVar[str]
+    averages_forces: ClassVar[bool]
+
+    @property
+    def damps(self) -> bool: ...
+
+    @property
+    def load_time(self) -> float: ...
+
+    @property
+    def initial_weight(self) -> float: ...
+
+    @property
+    def final_weight(self) -> float: ...
+
+    def velocity(self, dt: float, state: Kinematics) -> Affine:
+        """Velocity at the end of a step that begins with a state."""
+        ...
+
+    def acceleration(self, dt: float, state: Kinematics) -> Affine:
+        """Acceleration at the end of a step."""
+        ...
+
+    def equation_velocity(self, dt: float, state: Kinematics) -> Affine:
+        """Velocity in the equation of a step."""
+        ...
+
+    def equation_acceleration(self, dt: float, state: Kinematics) -> Affine:
+        """Acceleration in the equation of a step."""
+        ...
 
 
 @dataclass(frozen=True)
-class Weighted:
-    """Generalised-alpha (Chung and Hulbert 1993), in which forces at both ends of a step are
-    weighted; Newmark's trapezoidal rule where both alphas are one half.
+class Euler:
+    """Backward Euler, of order 1."""
+
+    name: ClassVar[str] = "euler"
+    order: ClassVar[int] = 1
+
+    def weights(self, steps: Sequence[float]) -> Array:
+        """See `FirstOrderIntegrator`."""
+        return np.array([1.0, -1.0]) / steps[0]
+
+    def error_fraction(self, dt: float, two_steps: float) -> float:
+        """See `FirstOrderIntegrator`."""
+        return dt / two_steps
+
+
+@dataclass(frozen=True)
+class BDF2:
+    """Backward differences of order 2, of steps of any length; the first step is Euler's."""
+
+    name: ClassVar[str] = "bdf2"
+    order: ClassVar[int] = 2
+
+    def weights(self, steps: Sequence[float]) -> Array:
+        """See `FirstOrderIntegrator`."""
+        if len(steps) == 1:
+            return Euler().weights(steps)
+        dt = steps[0]
+        r = dt / steps[1]
+        return np.array([(1.0 + 2.0 * r) / (1.0 + r), -(1.0 + r), r**2 / (1.0 + r)]) / dt
+
+    def error_fraction(self, dt: float, two_steps: float) -> float:
+        """See `FirstOrderIntegrator`; of equal steps."""
+        return 2.0 / 11.0
+
+
+class _WeightedForces:
+    """Newmark's formulas with forces and inertia weighted between both ends of a step.
 
         (1 - am) M a1 + am M a0 + (1 - af) f1 + af f0 + c = 0
 
@@ -46,161 +159,248 @@ class Weighted:
     ties and contacts above all, hold at the end of the step.
     """
 
-    am: float
-    af: float
+    averages_forces: ClassVar[bool] = False
+    load_time: ClassVar[float] = 1.0
 
-    averaged = False
-
-    @classmethod
-    def of(cls, radius: float) -> Weighted:
-        """With a spectral radius at infinite frequency in [0, 1]; order 2."""
-        return cls((2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0))
+    def _coefficients(self) -> tuple[float, float, float, float]:
+        """Inertia weight am, force weight af, beta, gamma."""
+        raise NotImplementedError
 
     @property
     def damps(self) -> bool:
-        """True if fast motions lose amplitude."""
-        return self.af < 0.5
+        """See `SecondOrderIntegrator`."""
+        return self._coefficients()[3] > 0.5
 
     @property
-    def gamma(self) -> float:
-        """Newmark's."""
-        return 0.5 - self.am + self.af
+    def initial_weight(self) -> float:
+        """See `SecondOrderIntegrator`; the equation is divided by 1 - af."""
+        af = self._coefficients()[1]
+        return af / (1.0 - af)
 
     @property
-    def beta(self) -> float:
-        """Newmark's."""
-        return 0.25 * (1.0 - self.am + self.af) ** 2
+    def final_weight(self) -> float:
+        """See `SecondOrderIntegrator`."""
+        return 1.0 - self._coefficients()[1]
 
-    def place(self) -> float:
-        """Share of the step at whose end loads count."""
-        return 1.0
+    def velocity(self, dt: float, state: Kinematics) -> Affine:
+        """See `SecondOrderIntegrator`."""
+        final, g = self.acceleration(dt, state), self._coefficients()[3] * dt
+        return Affine(g * final.c, state.v + (dt - g) * state.a + g * final.rest)
 
-    def velocity(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """At the end of a step from u, v, a, (n,) each."""
-        after, g = self.acceleration(dt, u, v, a), self.gamma * dt
-        return Affine(g * after.c, v + (dt - g) * a + g * after.rest)
+    def acceleration(self, dt: float, state: Kinematics) -> Affine:
+        """See `SecondOrderIntegrator`."""
+        beta = self._coefficients()[2]
+        c = 1.0 / (beta * dt**2)
+        return Affine(c, -c * (state.x + dt * state.v) - (0.5 / beta - 1.0) * state.a)
 
-    def acceleration(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """Likewise."""
-        c = 1.0 / (self.beta * dt**2)
-        return Affine(c, -c * (u + dt * v) - (0.5 / self.beta - 1.0) * a)
+    def equation_velocity(self, dt: float, state: Kinematics) -> Affine:
+        """See `SecondOrderIntegrator`."""
+        return self.velocity(dt, state)
 
-    def inertial(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """The acceleration in the equation, which is divided by 1 - af."""
-        over = 1.0 / (1.0 - self.af)
-        return self.acceleration(dt, u, v, a).mixed(over * (1.0 - self.am), a, over * self.am)
+    def equation_acceleration(self, dt: float, state: Kinematics) -> Affine:
+        """See `SecondOrderIntegrator`; the equation is divided by 1 - af."""
+        am, af, _, _ = self._coefficients()
+        scale = 1.0 / (1.0 - af)
+        return self.acceleration(dt, state).combined(scale * (1.0 - am), state.a, scale * am)
 
-    def rate(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """The velocity in the equation."""
-        return self.velocity(dt, u, v, a)
 
-    def before(self) -> float:
-        """Factor of the forces at the beginning of the step in the equation."""
-        return self.af / (1.0 - self.af)
+@dataclass(frozen=True)
+class GeneralisedAlpha(_WeightedForces):
+    """Generalised-alpha method of order 2 (Chung and Hulbert 1993).
 
-    def weight(self) -> float:
-        """Of the forces at the end."""
-        return 1.0 - self.af
+    Parameters
+    ----------
+    rho_inf : float
+        Spectral radius at infinite frequency, 0 (damps most) to 1 (damps nothing). At 0.8 a fifth
+        of the amplitude of what the mesh cannot resolve is lost in each step.
+
+    Raises
+    ------
+    StudyError
+        The radius is not in [0, 1].
+    """
+
+    name: ClassVar[str] = "generalised-alpha"
+    rho_inf: float = 0.8
+
+    def __post_init__(self) -> None:
+        """Check the radius."""
+        if not 0.0 <= self.rho_inf <= 1.0:
+            raise StudyError(
+                f"rho_inf = {self.rho_inf:g}: allowed is 0 (damps most) to 1 (damps nothing)"
+            )
+
+    def _coefficients(self) -> tuple[float, float, float, float]:
+        rho = self.rho_inf
+        am, af = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
+        return am, af, 0.25 * (1.0 - am + af) ** 2, 0.5 - am + af
+
+
+@dataclass(frozen=True)
+class Newmark(_WeightedForces):
+    """Newmark's method (1959).
+
+    Parameters
+    ----------
+    beta, gamma : float
+        Coefficients of the acceleration at the end of a step in displacement and velocity. The
+        default is the trapezoidal rule of order 2; gamma above 1/2 damps, with order 1.
+
+    Raises
+    ------
+    StudyError
+        beta is not positive, or gamma is below 1/2.
+    """
+
+    name: ClassVar[str] = "newmark"
+    beta: float = 0.25
+    gamma: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Check the coefficients."""
+        if not self.beta > 0.0 or not np.isfinite(self.beta):
+            raise StudyError(
+                f"beta = {self.beta:g}: must be positive; beta = 0 is softehl.CentralDifference()"
+            )
+        if not self.gamma >= 0.5 or not np.isfinite(self.gamma):
+            raise StudyError(
+                f"gamma = {self.gamma:g}: must be at least 0.5, below it every motion grows"
+            )
+
+    def _coefficients(self) -> tuple[float, float, float, float]:
+        # with consistent accelerations the mean of both ends is the trapezoidal rule
+        mean = 0.5 if (self.beta, self.gamma) == (0.25, 0.5) else 0.0
+        return mean, mean, self.beta, self.gamma
 
 
 @dataclass(frozen=True)
 class Midpoint:
-    """The midpoint rule with the `discrete_gradient` of the energy along the step: energy stays."""
+    """Midpoint rule with forces averaged along the step (`fem.averaged`): it conserves energy."""
 
-    averaged = True
-    damps = False
+    name: ClassVar[str] = "midpoint"
+    averages_forces: ClassVar[bool] = True
+    damps: ClassVar[bool] = False
+    load_time: ClassVar[float] = 0.5
+    initial_weight: ClassVar[float] = 0.0
+    final_weight: ClassVar[float] = 1.0
 
-    def place(self) -> float:
-        """Loads are those of the middle."""
-        return 0.5
+    def velocity(self, dt: float, state: Kinematics) -> Affine:
+        """See `SecondOrderIntegrator`."""
+        return Affine(2.0 / dt, -2.0 / dt * state.x - state.v)
 
-    def velocity(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """At the end of a step."""
-        return Affine(2.0 / dt, -2.0 / dt * u - v)
+    def acceleration(self, dt: float, state: Kinematics) -> Affine:
+        """Mean acceleration of the step."""
+        return Affine(2.0 / dt**2, -2.0 / dt**2 * state.x - 2.0 / dt * state.v)
 
-    def acceleration(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """Mean of the step."""
-        return Affine(2.0 / dt**2, -2.0 / dt**2 * u - 2.0 / dt * v)
+    def equation_velocity(self, dt: float, state: Kinematics) -> Affine:
+        """Mean velocity of the step."""
+        return Affine(1.0 / dt, -state.x / dt)
 
-    def inertial(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """The acceleration in the equation."""
-        return self.acceleration(dt, u, v, a)
-
-    def rate(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """The velocity in the equation: the mean of the step."""
-        return Affine(1.0 / dt, -u / dt)
-
-    def before(self) -> float:
-        """No forces of the beginning."""
-        return 0.0
-
-    def weight(self) -> float:
-        """All forces are means of the step."""
-        return 1.0
+    def equation_acceleration(self, dt: float, state: Kinematics) -> Affine:
+        """See `SecondOrderIntegrator`."""
+        return self.acceleration(dt, state)
 
 
 @dataclass(frozen=True)
-class Backward:
-    """Backward Euler steps, which find what belongs to an inconsistent beginning."""
+class BackwardEulerDynamics:
+    """Backward Euler steps with inertia, which make an inconsistent initial state consistent."""
 
-    averaged = False
-    damps = True
+    name: ClassVar[str] = "euler"
+    averages_forces: ClassVar[bool] = False
+    damps: ClassVar[bool] = True
+    load_time: ClassVar[float] = 1.0
+    initial_weight: ClassVar[float] = 0.0
+    final_weight: ClassVar[float] = 1.0
 
-    def place(self) -> float:
-        """Loads are those of the end."""
-        return 1.0
+    def velocity(self, dt: float, state: Kinematics) -> Affine:
+        """See `SecondOrderIntegrator`."""
+        return Affine(1.0 / dt, -state.x / dt)
 
-    def velocity(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """At the end of a step."""
-        return Affine(1.0 / dt, -u / dt)
+    def acceleration(self, dt: float, state: Kinematics) -> Affine:
+        """See `SecondOrderIntegrator`."""
+        return Affine(1.0 / dt**2, -(state.x / dt + state.v) / dt)
 
-    def acceleration(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """Likewise."""
-        return Affine(1.0 / dt**2, -(u / dt + v) / dt)
+    def equation_velocity(self, dt: float, state: Kinematics) -> Affine:
+        """See `SecondOrderIntegrator`."""
+        return self.velocity(dt, state)
 
-    def inertial(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """The acceleration in the equation."""
-        return self.acceleration(dt, u, v, a)
-
-    def rate(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
-        """The velocity in the equation."""
-        return self.velocity(dt, u, v, a)
-
-    def before(self) -> float:
-        """No forces of the beginning."""
-        return 0.0
-
-    def weight(self) -> float:
-        """All forces are those of the end."""
-        return 1.0
+    def equation_acceleration(self, dt: float, state: Kinematics) -> Affine:
+        """See `SecondOrderIntegrator`."""
+        return self.acceleration(dt, state)
 
 
-Scheme: TypeAlias = Weighted | Midpoint | Backward
+@dataclass(frozen=True)
+class CentralDifference:
+    """Central differences (velocity Verlet) with lumped masses: explicit, as many stable steps as a
+    result needs.
+    """
+
+    name: ClassVar[str] = "explicit"
+
+    def half_step(self, dt: float, v: Array, a: Array) -> Array:
+        """Velocity (n,) half a step later."""
+        return v + 0.5 * dt * a
+
+    def stable_step(self, frequency_squared: float) -> float:
+        """Longest stable step for the square of the highest angular frequency."""
+        return float(2.0 / np.sqrt(frequency_squared))
 
 
-def scheme_of(method: str, radius: float | None) -> Scheme | None:
-    """The implicit scheme of a name, None for "explicit".  Raises StudyError."""
-    if radius is not None and method != "generalised-alpha":
-        raise StudyError(f'rho_inf = {radius:g}: only method = "generalised-alpha" has it')
-    if radius is not None and not 0.0 <= radius <= 1.0:
-        raise StudyError(f"rho_inf = {radius:g}: allowed is 0 (damps most) to 1 (damps nothing)")
-    if method == "generalised-alpha":
-        return Weighted.of(DAMPED if radius is None else radius)
-    if method == "newmark":
-        return Weighted.of(1.0)  # with consistent accelerations it is the same
-    return Midpoint() if method == "midpoint" else None
+TimeIntegrator: TypeAlias = FirstOrderIntegrator | SecondOrderIntegrator | CentralDifference
+MethodName: TypeAlias = Literal[
+    "euler", "bdf2", "generalised-alpha", "newmark", "midpoint", "explicit"
+]
+INTEGRATORS: dict[str, Callable[..., TimeIntegrator]] = {
+    kind.name: kind
+    for kind in (Euler, BDF2, GeneralisedAlpha, Newmark, Midpoint, CentralDifference)
+}
+"""Integrators by their short names."""
 
 
-def require_method(method: object, others: tuple[str, ...]) -> None:
-    """Raise StudyError for a name that is none of these, and none of ours."""
-    names = (*others, *METHODS)
-    if method not in names:
-        words = ", ".join(f'"{name}"' for name in names)
-        raise StudyError(f"method = {method!r}{meant(method, names)}: allowed are {words}")
+def integrator_of(method: object, **parameters: float | None) -> TimeIntegrator:
+    """Return an integrator, or that of a short name with these parameters, None for its default.
 
-
-def require_none(method: object, given: Mapping[str, object]) -> None:
-    """Raise StudyError for an argument that the method does not have."""
+    Raises StudyError for an unknown name, and for a parameter that the integrator does not have.
+    """
+    given = {name: value for name, value in parameters.items() if value is not None}
+    kinds = FirstOrderIntegrator | SecondOrderIntegrator | CentralDifference
+    if isinstance(method, kinds) and not isinstance(method, type):
+        for name, value in given.items():
+            raise StudyError(f"{name} = {value:g}: give it to the integrator, not beside {method}")
+        return method
+    if not isinstance(method, str) or method not in INTEGRATORS:
+        names = ", ".join(f'"{name}"' for name in INTEGRATORS)
+        raise StudyError(
+            f"method = {method!r}{meant(method, INTEGRATORS)}: allowed are {names}, or an "
+            "integrator such as softehl.BDF2()"
+        )
     for name, value in given.items():
-        if value is not None:
-            raise StudyError(f'{name}: method = "{method}" has no such thing; leave it out')
+        having = [f'"{n}"' for n, kind in INTEGRATORS.items() if name in signature(kind).parameters]
+        if f'"{method}"' not in having:
+            raise StudyError(f"{name} = {value:g}: only method = {', '.join(having)} has it")
+    return INTEGRATORS[method](**given)
+
+
+def require_arguments(
+    integrator: TimeIntegrator, march: Callable[..., Any], arguments: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the arguments that are given, not None; `march` goes by this integrator.
+
+    Raises StudyError for one that the signature of `march` does not have.
+    """
+    given = {name: value for name, value in arguments.items() if value is not None}
+    for name in given:
+        if name not in signature(march).parameters:
+            raise StudyError(
+                f'{name}: method = "{integrator.name}" has no such thing; leave it out'
+            )
+    return given
+
+
+def step_before_end(remaining: float, dt: float) -> float:
+    """Length of a step of about dt that leaves no sliver of the remaining time."""
+    if remaining <= dt * (1.0 + 1e-9):
+        return remaining
+    if remaining < 2.0 * dt and remaining > dt * (1.0 + 1e-9):
+        return min(dt, 0.5 * remaining)
+    return dt

@@ -1,4 +1,4 @@
-"""The kernel of a page: by the front door, which knows when the generator is needed."""
+"""Kernels of pages on kinds of cells, and kernels of their derivatives when they are needed."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from softehl.runtime.definition import page_loader
 from softehl.runtime.definition.element_blocks import is_folder, require_page
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.kernels.kernel import Kernel
@@ -31,9 +32,7 @@ class Origin:
         if isinstance(self.source, Kernel):
             return self.source
         require_page(self.source)
-        import softehl
-
-        return softehl.load_kernel(
+        return page_loader.load_page(
             self.source, self.model, cell=kind, geometry=self.geometry, materials=self.law
         )
 
@@ -81,10 +80,8 @@ class Derived:
         return self._loaded(self.origin, derivatives=True)
 
     def _loaded(self, origin: Origin, *, derivatives: bool = False) -> Kernel:
-        import softehl
-
         kernel = self.kernel
-        return softehl.load_kernel(
+        return page_loader.load_page(
             origin.source,
             origin.model or (None if kernel.cell else kernel.name),
             cell=kernel.cell or None,

@@ -2,24 +2,145 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from softehl.runtime.arrays import Array
-from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.arrays import Array, Flags
+from softehl.runtime.definition.argument_checks import finite
+from softehl.runtime.definition.problem_definition import Statement, StudyError
 from softehl.runtime.discretisation.problem_checks import ProblemError
-from softehl.runtime.fit.measurements import Data
 from softehl.runtime.fit.objective import Trials
-from softehl.runtime.fit.scaling import Bounds, Scale
 from softehl.runtime.kernels.kernel_call import ArgumentError
 from softehl.runtime.results.result import Result
-from softehl.runtime.sensitivity.inputs import Key
+from softehl.runtime.sensitivity.input_parsing import By
+from softehl.runtime.sensitivity.inputs import Input, Key, PageDatum, PageParameter
 from softehl.runtime.sensitivity.jacobian import Entry, by_key, jacobian
+from softehl.runtime.sensitivity.quantities import AtPlace, Quantity, Reaction
 from softehl.runtime.solve.solution import NotConverged
-from softehl.runtime.suggestions import few
+from softehl.runtime.suggestions import few, listed
+
+Measured: TypeAlias = Mapping[Any, Mapping[str, Any]]
+"""A place (x, y), or a side for its reactions -> unknown -> a number, one for each step, or
+{time or load factor: number}."""
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Measurements: quantities, their numbers (m,), and the time or load factor of each, (m,)."""
+
+    quantities: list[Quantity]
+    numbers: Array
+    times: Array
+
+    @classmethod
+    def read(cls, measured: Measured, times: Array) -> Data:
+        """As they were given; a list has a number for each of the times.  Raises StudyError."""
+        found: list[tuple[Quantity, float, float]] = []
+        if not isinstance(measured, Mapping) or not measured:
+            raise StudyError('measured: a mapping is needed, {(48, 60): {"u_y": 12.4}}')
+        for place, values in measured.items():
+            if not isinstance(values, Mapping) or not values:
+                raise StudyError(f'measured at {place!r}: give unknowns, {{"u_y": 12.4}}')
+            for name, given in values.items():
+                made = Reaction(name, place) if isinstance(place, str) else _at(name, place)
+                words = f"measured at {place!r}: {name}"
+                found += [(made, v, t) for t, v in _series(words, given, times)]
+        quantities, numbers, places = zip(*found, strict=True)
+        return cls([*quantities], np.array(numbers), np.array(places))
+
+
+def _series(words: str, given: Any, times: Array) -> list[tuple[float, float]]:
+    """Times and numbers.  Raises StudyError."""
+    if isinstance(given, Mapping):
+        pairs = [(float(t), float(v)) for t, v in given.items()]
+    else:
+        if isinstance(given, np.ma.MaskedArray):
+            raise StudyError(f"{words} is a masked array: give {{t: number}} of what was measured")
+        row = np.asarray(given, dtype=np.float64)
+        if row.ndim and row.shape != times.shape:
+            raise StudyError(
+                f"{words} has {len(row)} numbers and the path {len(times)} steps: give one for "
+                "each, or {t: number}, or one number for the last"
+            )
+        ends = times if row.ndim else times[-1:]
+        pairs = [*zip(ends.tolist(), np.atleast_1d(row).tolist(), strict=True)]
+    if not pairs or not np.isfinite(pairs).all():
+        raise StudyError(f"{words} must be finite numbers")
+    return pairs
+
+
+def _at(name: str, place: Any) -> AtPlace:
+    try:
+        return AtPlace(name, tuple(float(c) for c in place))
+    except (TypeError, ValueError):
+        raise StudyError(
+            f"measured at {place!r}: a place is a tuple of numbers, a side is a name"
+        ) from None
+
+
+Bounds: TypeAlias = Mapping[Key, tuple[float, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """Variables of the search, (k,): logarithms of what must stay positive, else multiples.
+
+    sizes: (k,) of the inputs. positive: which of them are searched by logarithms: parameters and
+    data of pages that are positive, unless their bounds allow other values.
+    """
+
+    sizes: Array
+    positive: Flags
+    start: Array
+    lower: Array
+    upper: Array
+
+    @classmethod
+    def of(cls, inputs: Sequence[Input], bounds: Bounds) -> Scale:
+        """Raises StudyError for bounds of other inputs, or without the start between them."""
+        start = np.concatenate([item.value for item in inputs])
+        lower, upper = _limits(inputs, bounds)
+        if (start < lower).any() or (start > upper).any() or (lower >= upper).any():
+            raise StudyError("bounds: give (least, largest) with the value in the study between")
+        stiff = [
+            np.full(len(item.value), isinstance(item, PageParameter | PageDatum)) for item in inputs
+        ]
+        positive = np.concatenate(stiff) & (start > 0.0) & ((lower >= 0.0) | (lower == -np.inf))
+        sizes = np.where(start == 0.0, 1.0, np.abs(start))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = [
+                np.where(positive, np.log(np.maximum(v, 0.0) / sizes), v / sizes)
+                for v in (start, lower, upper)
+            ]
+        return cls(sizes, positive, *found)
+
+    def values(self, y: Array) -> Array:
+        """Inputs (k,) of variables (k,)."""
+        with np.errstate(over="ignore"):
+            return np.asarray(self.sizes * np.where(self.positive, np.exp(y), y))
+
+    def slopes(self, y: Array) -> Array:
+        """Derivatives (k,) of the inputs by the variables."""
+        return np.asarray(np.where(self.positive, self.values(y), self.sizes))
+
+
+def _limits(inputs: Sequence[Input], bounds: Bounds) -> tuple[Array, Array]:
+    keys = [item.key for item in inputs]
+    for key in bounds:
+        if key not in keys:
+            raise StudyError(f"bounds: no input {key!r}; there are {listed(map(str, keys))}")
+    pairs = [bounds.get(item.key, (-np.inf, np.inf)) for item in inputs]
+    sizes = [len(item.value) for item in inputs]
+    lower, upper = (
+        np.concatenate([np.full(n, pair[side]) for n, pair in zip(sizes, pairs, strict=True)])
+        for side in (0, 1)
+    )
+    return lower, upper
+
 
 _FAILED = (NotConverged, ArgumentError, ProblemError)
 """Ends of a trial after which the next one is nearer to the last that was solved."""
@@ -164,3 +285,26 @@ class LeastSquares:
         if self.sigma is None:
             scale = float(residuals @ residuals) / (m - k) if m > k else np.inf
         return scale * half @ half.T, ""
+
+
+def fit(
+    definition: Statement,
+    measured: Measured,
+    *,
+    by: By,
+    bounds: Bounds | None = None,
+    sigma: float | Array | None = None,
+    most: int = 100,
+    arguments: Mapping[str, Any],
+) -> Fit:
+    """Fit inputs to measurements by least squares; see `Study.fit`."""
+    until = finite("until", arguments.get("until", 1.0))
+    count = arguments.get("steps", 1)
+    times = until * np.arange(1, count + 1) / count
+    if "dt" in arguments:
+        dt = arguments["dt"]
+        times = dt * np.arange(1, round(until / dt) + 1)
+    data = Data.read(measured, times)
+    deviations = None if sigma is None else np.broadcast_to(sigma, data.numbers.shape).copy()
+    trials = Trials.by(definition, by, arguments)
+    return LeastSquares(trials, data, deviations).fit(bounds, most)

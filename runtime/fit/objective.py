@@ -2,32 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any
 
 import numpy as np
 
+from softehl.runtime.analyses.load_stepping import solve
+from softehl.runtime.analyses.solver_options import SolverOptions
+from softehl.runtime.analyses.time_stepping import march
 from softehl.runtime.arrays import Array
+from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.equations.stability import UnstableState
 from softehl.runtime.results.result import Result
-from softehl.runtime.sensitivity.inputs import Input, Key
+from softehl.runtime.sensitivity import input_parsing
+from softehl.runtime.sensitivity.input_parsing import By
+from softehl.runtime.sensitivity.inputs import Input, Key, varied
 from softehl.runtime.sensitivity.jacobian import jacobian
-from softehl.runtime.sensitivity.quantities import Quantity
+from softehl.runtime.sensitivity.quantities import Quantity, quantity
 from softehl.runtime.suggestions import few
-
-Run: TypeAlias = Callable[[Sequence[tuple[Input, Array]]], list[Result]]
-"""The results of all steps with other values of inputs."""
 
 
 @dataclass(eq=False)
 class Trials:
-    """A study solved for values of its inputs, (k,); the latest is remembered."""
+    """Results of a study for values of its inputs, (k,); the latest are cached.
 
+    arguments: of `solve`, or of `march` if there is a dt. count: how often the study was solved.
+    """
+
+    definition: Statement
     inputs: Sequence[Input]
-    run: Run
+    arguments: Mapping[str, Any]
     count: int = 0
-    _at: Array | None = None
     results: list[Result] = field(default_factory=list)
+    _cached_values: Array | None = None
+
+    @classmethod
+    def by(cls, definition: Statement, by: By, arguments: Mapping[str, Any]) -> Trials:
+        """Return the trials of a definition by inputs.  Raises StudyError."""
+        return cls(definition, input_parsing.inputs(definition, by), arguments)
 
     @property
     def start(self) -> Array:
@@ -36,13 +50,25 @@ class Trials:
 
     def solved(self, values: Array) -> list[Result]:
         """Results of all steps."""
-        if self._at is None or not np.array_equal(self._at, values):
+        if self._cached_values is None or not np.array_equal(self._cached_values, values):
             cuts = np.cumsum([len(item.value) for item in self.inputs])[:-1]
             parts = np.split(np.asarray(values, dtype=np.float64), cuts)
-            self._at, self.count = None, self.count + 1
-            self.results = self.run([*zip(self.inputs, parts, strict=True)])
-            self._at = np.array(values)
+            self._cached_values, self.count = None, self.count + 1
+            self.results = self._solve([*zip(self.inputs, parts, strict=True)])
+            self._cached_values = np.array(values)
         return self.results
+
+    def _solve(self, changes: Sequence[tuple[Input, Array]]) -> list[Result]:
+        """Results of all steps with other values of inputs."""
+        definition, results = varied(self.definition, changes), list[Result]()
+        keywords = {"progress": False, "record": True, **self.arguments}
+        options, arguments = SolverOptions.split(keywords)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UnstableState)  # of values between
+            if "dt" in arguments:
+                return list(march(definition, options=options, **arguments))
+            solve(definition, on_step=results.append, options=options, **arguments)
+        return results
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,3 +125,39 @@ class Objective:
         assert trail is not None
         row = jacobian([(trail, self.quantity)], self.trials.inputs)[0]
         return self.quantity.value(trail), row
+
+
+def objective(
+    definition: Statement,
+    what: str | Callable[[Array], tuple[float, Array]],
+    *,
+    by: By,
+    at: tuple[float, ...] | None = None,
+    reaction: str | None = None,
+    arguments: Mapping[str, Any],
+) -> Objective:
+    """Return a quantity as a function of inputs; see `Study.objective`."""
+    return Objective(Trials.by(definition, by, arguments), quantity(what, at, reaction))
+
+
+def varied_definition(definition: Statement, values: Mapping[Key, float | Array]) -> Statement:
+    """Return a copy of a definition with other values of inputs; see `Study.varied`."""
+    inputs = input_parsing.of_keys(definition, list(values))
+    changes = [(i, _numbers(i, v)) for i, v in zip(inputs, values.values(), strict=True)]
+    return varied(definition, changes)
+
+
+def _numbers(item: Input, value: object) -> Array:
+    """Numbers of an input, one for all or one for each.  Raises StudyError."""
+    words, n = f"varied({item.key!r}: ...)", item.value.size
+    given = np.asarray(value)
+    if given.dtype.kind not in "fiu":
+        raise StudyError(
+            f"{words}: a number is needed, which replaces a number of the study and multiplies a "
+            f"function; given {type(value).__name__}; for another function write the study anew"
+        )
+    found = given.astype(np.float64)
+    if found.size not in (1, n) or not np.isfinite(found).all():
+        many = f", or {n} of them" if n > 1 else ""
+        raise StudyError(f"{words}: one finite number{many} is needed; given {value!r}")
+    return np.broadcast_to(found.ravel(), n).copy()

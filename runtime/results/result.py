@@ -17,7 +17,7 @@ from softehl.runtime.definition.argument_checks import writable
 from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.discretisation.problem import Problem
-from softehl.runtime.equations.eigenproblems import natural
+from softehl.runtime.equations.eigenproblems import natural_modes
 from softehl.runtime.equations.interpolation import (
     at_every_node,
     between_nodes,
@@ -442,7 +442,7 @@ class Result:
             There is no mass, or the tangent is unsymmetric.
         """
         x = self.point.solution.x
-        squares, found = natural(self.system, self.problem, x, count, mass)
+        squares, found = natural_modes(self.system, self.problem, x, count, mass)
         return Modes(read_only(squares), tuple(ModeShape.of(self, mode) for mode in found))
 
     def sensitivity(

@@ -12,8 +12,7 @@ from softehl.runtime.sensitivity.element_derivatives import Elements
 from softehl.runtime.sensitivity.inputs import Input
 from softehl.runtime.sensitivity.linearised_step import Linear
 from softehl.runtime.sensitivity.quantities import Quantity
-from softehl.runtime.sensitivity.tape import Trail
-from softehl.runtime.sensitivity.time_coupling import carried, remembering
+from softehl.runtime.sensitivity.tape import Trail, carried, remembering
 
 
 @dataclass(eq=False)

@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.sensitivity.input_seeds import Moves
-from softehl.runtime.sensitivity.inputs import Input
+from softehl.runtime.sensitivity.inputs import Input, Moves
 from softehl.runtime.sensitivity.linearised_step import Linear
-from softehl.runtime.sensitivity.tape import Trail
-from softehl.runtime.sensitivity.time_coupling import carried, remembering
+from softehl.runtime.sensitivity.tape import Trail, carried, remembering
 
 
 @dataclass(eq=False)

@@ -12,8 +12,7 @@ from softehl.runtime.sensitivity.direct import along_path
 from softehl.runtime.sensitivity.inputs import Input, Key
 from softehl.runtime.sensitivity.linearised_step import Linear
 from softehl.runtime.sensitivity.quantities import Quantity
-from softehl.runtime.sensitivity.tape import Trail
-from softehl.runtime.sensitivity.time_coupling import carried, remembering
+from softehl.runtime.sensitivity.tape import Trail, carried, remembering
 
 Entry = tuple[Trail, Quantity]
 """A quantity of a converged step."""

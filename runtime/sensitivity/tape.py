@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import Step, System
@@ -115,3 +116,34 @@ def _at_rest(first: Trail) -> bool:
     rest = first.system.histories()
     same = [np.array_equal(first.step.histories[name], values) for name, values in rest.items()]
     return all(same) and np.array_equal(first.step.old, first.system.at_rest())
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """Data of a block that are values of steps before.
+
+    column: among coordinates, data and parameters. numbers: (n,) unknowns whose values they are.
+    weights: of the step before, of that before it.
+    """
+
+    block: str
+    column: int
+    numbers: Integers
+    weights: tuple[float, ...]
+
+
+def carried(trail: Trail) -> Iterator[Carried]:
+    """Values from steps before in the data of a step."""
+    nodal = trail.system.numbering.nodal
+    for block in trail.system.blocks.values():
+        first = block.kernel.nodes * len(block.kernel.coordinates)
+        for slots, weights in ((block.previous, (1.0,)), (block.rates, trail.step.weights)):
+            for name, slot in slots.items():
+                numbers = nodal[slot.name][block.nodes[:, slot.node or 0]]
+                column = first + block.kernel.data.index(name)
+                yield Carried(block.name, column, numbers, weights)
+
+
+def remembering(trail: Trail) -> list[str]:
+    """Blocks whose points have data of their own."""
+    return [b.name for b in trail.system.blocks.values() if b.initial is not None]

@@ -45,12 +45,21 @@ if TYPE_CHECKING:
     from softehl.codegen.tools.cache_dir import CacheError
     from softehl.codegen.tools.model_text import ModelFileError
     from softehl.codegen.verify.random_states import NoStateError
+    from softehl.runtime.analyses.arc_length_path import LoadPath
     from softehl.runtime.analyses.bifurcation import Bifurcation, MissedBifurcations
     from softehl.runtime.analyses.buckling import Buckling
     from softehl.runtime.analyses.callbacks import Series
     from softehl.runtime.analyses.homogenisation import Cell, Homogenised
-    from softehl.runtime.analyses.load_stepping import LoadPath
     from softehl.runtime.analyses.motion import EnergyGain, Motion
+    from softehl.runtime.analyses.solver_options import SolverOptions
+    from softehl.runtime.analyses.time_integrators import (
+        BDF2,
+        CentralDifference,
+        Euler,
+        GeneralisedAlpha,
+        Midpoint,
+        Newmark,
+    )
     from softehl.runtime.definition.problem_definition import StudyError
     from softehl.runtime.discretisation.assembly import Assembler
     from softehl.runtime.discretisation.dofmap import DofLayout
@@ -96,34 +105,40 @@ _PUBLIC = {
     "Arclength": "softehl.runtime.solve.arclength",
     "ArgumentError": "softehl.runtime.kernels.kernel_call",
     "Assembler": "softehl.runtime.discretisation.assembly",
+    "BDF2": "softehl.runtime.analyses.time_integrators",
     "BadInput": "softehl.cases.harness.errors",
     "Bifurcation": "softehl.runtime.analyses.bifurcation",
     "Branch": "softehl.runtime.solve.solution",
     "Buckling": "softehl.runtime.analyses.buckling",
     "Cell": "softehl.runtime.analyses.homogenisation",
+    "CentralDifference": "softehl.runtime.analyses.time_integrators",
     "ContactState": "softehl.cases.seal.states.state",
     "Continuation": "softehl.runtime.solve.continuation",
     "Curve": "softehl.cases.harness.sweep",
     "DofLayout": "softehl.runtime.discretisation.dofmap",
     "ElementBlock": "softehl.runtime.discretisation.element_blocks",
     "EnergyGain": "softehl.runtime.analyses.motion",
+    "Euler": "softehl.runtime.analyses.time_integrators",
     "FilmState": "softehl.cases.seal.states.state",
     "Fit": "softehl.runtime.fit.least_squares",
+    "GeneralisedAlpha": "softehl.runtime.analyses.time_integrators",
     "Homogenised": "softehl.runtime.analyses.homogenisation",
     "Kernel": "softehl.runtime.kernels.kernel",
     "KernelError": "softehl.runtime.kernels.shared_library",
     "Ladder": "softehl.runtime.solve.solver_cascade",
     "LimitPoint": "softehl.runtime.solve.solution",
-    "LoadPath": "softehl.runtime.analyses.load_stepping",
+    "LoadPath": "softehl.runtime.analyses.arc_length_path",
     "MatrixFree": "softehl.runtime.parallel.matrix_free",
     "Mesh": "softehl.runtime.mesh.mesh",
     "MeshError": "softehl.runtime.mesh.mesh",
+    "Midpoint": "softehl.runtime.analyses.time_integrators",
     "MissedBifurcations": "softehl.runtime.analyses.bifurcation",
     "MissingBackend": "softehl.runtime.solve.linear.direct",
     "MissingPetsc": "softehl.runtime.mpi",
     "ModeShape": "softehl.runtime.results.result",
     "Modes": "softehl.runtime.results.result",
     "Motion": "softehl.runtime.analyses.motion",
+    "Newmark": "softehl.runtime.analyses.time_integrators",
     "Newton": "softehl.runtime.solve.newton",
     "NoModes": "softehl.runtime.solve.eigen",
     "NotConverged": "softehl.runtime.solve.solution",
@@ -144,6 +159,7 @@ _PUBLIC = {
     "Silent": "softehl.cases.seal.states.state",
     "SingularMatrix": "softehl.runtime.solve.linear.linear_solver",
     "Solution": "softehl.runtime.solve.solution",
+    "SolverOptions": "softehl.runtime.analyses.solver_options",
     "Status": "softehl.runtime.solve.solution",
     "StepRule": "softehl.runtime.solve.continuation",
     "Study": "softehl.runtime.study",
@@ -182,6 +198,7 @@ _MODELLING = {
 """What a model page needs; these import SymPy."""
 
 __all__ = [
+    "BDF2",
     "Arclength",
     "ArgumentError",
     "Assembler",
@@ -192,6 +209,7 @@ __all__ = [
     "BuildError",
     "CacheError",
     "Cell",
+    "CentralDifference",
     "ContactState",
     "Continuation",
     "Curve",
@@ -201,9 +219,11 @@ __all__ = [
     "Element",
     "ElementBlock",
     "EnergyGain",
+    "Euler",
     "Fields",
     "FilmState",
     "Fit",
+    "GeneralisedAlpha",
     "Homogenised",
     "Kernel",
     "KernelError",
@@ -215,6 +235,7 @@ __all__ = [
     "MatrixFree",
     "Mesh",
     "MeshError",
+    "Midpoint",
     "MissedBifurcations",
     "MissingBackend",
     "MissingPetsc",
@@ -225,6 +246,7 @@ __all__ = [
     "ModelWarning",
     "Modes",
     "Motion",
+    "Newmark",
     "Newton",
     "NoModes",
     "NoStateError",
@@ -249,6 +271,7 @@ __all__ = [
     "SingularMatrix",
     "SoftehlError",
     "Solution",
+    "SolverOptions",
     "Status",
     "StepRule",
     "Study",
@@ -375,3 +398,8 @@ def load_kernel(
     with with_sympy():
         folder = kernel_cache.folder_of(place, where, derivatives=derivatives)
     return kernel.kernel_in(folder, name, cell)
+
+
+from softehl.runtime.definition import page_loader  # noqa: E402, after __path__ is complete
+
+page_loader.load_page = load_kernel  # the runtime has no compiler

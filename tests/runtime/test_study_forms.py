@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from softehl import Definition, Mesh, Model, Study, element, kinematics, load_kernel, quadrature
-from softehl.runtime.analyses.initial_state import beginning
+from softehl.runtime.analyses.initial_state import initial_state
 from softehl.runtime.analyses.motion import stored_energy
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.matrix_free_products import NoProductError, require_product
 from softehl.runtime.discretisation.quadrature import film_rule
-from softehl.runtime.study import StudyError
 
 
 @cache
@@ -82,7 +82,7 @@ def test_ends_of_a_field_along_lines_are_unknowns_of_nodes() -> None:
     result = study.solve()
     assert result.values("p") == pytest.approx([2.0, 5.0, 3.0], rel=1e-12)
     assert result.fields("pipe")["p"] == pytest.approx(2.0 + result.fields("pipe")["x"], rel=1e-12)
-    assert beginning(study.system(), result)[1].tolist() == result.x.tolist()
+    assert initial_state(study.system(), result).x.tolist() == result.x.tolist()
 
 
 def test_elements_stand_at_places_of_a_field_of_others() -> None:
@@ -96,7 +96,7 @@ def test_elements_stand_at_places_of_a_field_of_others() -> None:
     result = study.solve()
     q = 7.0 / (1 / 0.4 + 1.0 + 1 / 0.4)
     assert result.values("p") == pytest.approx([7.0 - q / 0.4, 3.5, q / 0.4], rel=1e-12)
-    assert beginning(study.system(), result)[1].tolist() == result.x.tolist()
+    assert initial_state(study.system(), result).x.tolist() == result.x.tolist()
 
 
 def test_derivatives_and_energies_know_the_rule_of_a_block() -> None:
