@@ -18,6 +18,13 @@ from softehl.runtime.solve.solution import NotConverged, Solution, Status
 ROOT = Path(__file__).parents[1]
 INNER = {"OutOfTimeError", "NotRealError", "DomainError", "StageError", "_CycleError"}
 """Caught where they are raised for."""
+WRAPPED = {
+    "a MeshError that names the file": {"AbaqusError", "GmshError"},
+    "a pydantic.ValidationError that names the key": {"NotUnderstoodError", "OutlineError"},
+    "another library, or engine": {"NoProductError", "NotTunedError"},
+    "nothing: a fault of the compiler": {"IllegalGraphError"},
+}
+"""Errors that become others before they reach a user."""
 
 
 def errors_of(path: Path) -> list[type[Exception]]:
@@ -38,6 +45,10 @@ def test_all_errors_have_one_base() -> None:
     found = [kind for path in files for kind in errors_of(path)]
     assert [kind for kind in found if not issubclass(kind, SoftehlError)] == []
     assert len(found) > 20
+    public = {getattr(softehl, name) for name in softehl.__all__} - {SoftehlError}
+    wrapped = set().union(*WRAPPED.values())
+    inner = {kind.__name__ for kind in found if not public & {*kind.__mro__}}
+    assert inner == wrapped
 
 
 @pytest.mark.parametrize(
