@@ -158,8 +158,8 @@ VERTEX_ORDER = {
 }
 """Node of basix's Lagrange element for each node, by (nodes, parent dimension): all there are.
 
-The nodes are in the order of `elements.cells`. The elements quad8 and hex20 have no
-counterpart: basix knows their functions, but not by values at nodes.
+The nodes are in the order of `elements.cells`. The elements quad8, hex20, wedge15
+and pyramid5 have no counterpart: basix knows their functions, but not by values at nodes.
 """
 
 

@@ -33,8 +33,8 @@ GENERATE = """
 import sys
 from softehl.codegen import pipeline
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import build, product
-for name, text in product.files([pipeline.compile_model(ALL[sys.argv[1]]())]).items():
+from softehl.codegen.tools import build, output_files
+for name, text in output_files.files([pipeline.compile_model(ALL[sys.argv[1]]())]).items():
     if name.startswith(sys.argv[1]):
         (build.GENERATED / name).write_text(text, encoding="utf-8")
 """

@@ -50,54 +50,6 @@ class QuadratureRule:
         return [[close_rational(x) for x in (*p, w)] for p, w in pairs]
 
 
-@dataclass(frozen=True)
-class Region:
-    """Reference cell of quadrature.
-
-    Attributes
-    ----------
-    name : str
-        Such as "triangle".
-    measure : Rational
-        Length, area or volume.
-    rule : str
-        A rule for it, in words.
-    """
-
-    name: str
-    measure: sp.Rational
-    rule: str
-
-    def fits(self, rule: QuadratureRule) -> bool:
-        """True if all points lie in it and the weights sum to its measure."""
-        points = [[float(x) for x in p] for p in rule.points]
-        inside = all(self._holds(p) for p in points)
-        return inside and abs(sum(map(float, rule.weights)) - float(self.measure)) < _SLACK
-
-    def _holds(self, p: list[float]) -> bool:
-        flat = {"triangle": 2, "tetrahedron": 3, "wedge": 2}.get(self.name, 0)
-        simplex, rest = p[:flat], p[flat:]
-        within = min([0.0, *simplex]) >= -_SLACK and sum(simplex) <= 1 + _SLACK
-        return within and all(abs(x) <= 1 + _SLACK for x in rest)
-
-
-_SLACK = 1e-9
-"""Of points and weights as doubles."""
-REGIONS = {
-    1: (Region("line", sp.Integer(2), "gauss(2, 1)"),),
-    2: (
-        Region("square", sp.Integer(4), "gauss(2, 2)"),
-        Region("triangle", sp.Rational(1, 2), "triangle(2)"),
-    ),
-    3: (
-        Region("cube", sp.Integer(8), "gauss(2, 3)"),
-        Region("tetrahedron", sp.Rational(1, 6), "tetrahedron(2)"),
-        Region("wedge", sp.Integer(1), "wedge(2)"),
-    ),
-}
-"""The reference cells of every dimension."""
-
-
 def point_rule() -> QuadratureRule:
     """Return the rule of a model without an integral: one point, no coordinates, weight one.
 
@@ -295,3 +247,33 @@ def _collapsed(dimension: int, degree: int) -> QuadratureRule:
         points.append(tuple(shrunk))
         weights.append(sp.prod([w for _, w in entry]))
     return QuadratureRule(dimension, tuple(points), tuple(weights))
+
+
+def pyramid(degree: int) -> QuadratureRule:
+    """Return a rule on the pyramid over [-1, 1]^2 with the apex (0, 0, 1).
+
+    Gauss and Jacobi with a collapsed face; products of the rational shape functions of pyramids
+    count as polynomials.
+
+    Parameters
+    ----------
+    degree : int
+        Degree of polynomials that are integrated exactly.
+
+    Returns
+    -------
+    QuadratureRule
+        The rule.
+
+    Raises
+    ------
+    ValueError
+        The degree is not a whole number of at least 1.
+    """
+    _require("pyramid", "degree", degree)
+    order = degree // 2 + 1
+    line = _line(order)
+    height = [((1 + x) / 2, w / 8) for x, w in _jacobi(order, 2)]
+    entries = list(product(line, line, height))
+    points = tuple((x * (1 - z), y * (1 - z), z) for (x, _), (y, _), (z, _) in entries)
+    return QuadratureRule(3, points, tuple(u * v * w for (_, u), (_, v), (_, w) in entries))

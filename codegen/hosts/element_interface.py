@@ -12,7 +12,7 @@ from functools import cached_property
 from softehl.codegen.abi import TargetError
 from softehl.codegen.derive import task_outputs
 from softehl.codegen.elements import cells
-from softehl.codegen.elements.cells import Element
+from softehl.codegen.elements.element import Element
 from softehl.codegen.language.definition import Argument, Definition
 
 
@@ -109,8 +109,11 @@ class ElementInterface:
     @cached_property
     def cell(self) -> Element | None:
         """Standard element of which the page has nodes, coordinates and rule; None for others."""
-        found = cells.of(self.definition.nodes, self.definition.rule.dimension)
-        return found[0] if found and found[0].dimension == self.dimension else None
+        rule = self.definition.rule
+        element = cells.of(self.definition.nodes, rule.dimension)
+        if element is None or element.dimension != self.dimension or not element.cell.fits(rule):
+            return None
+        return element
 
     # unknowns -----------------------------------------------------------------------------------
 

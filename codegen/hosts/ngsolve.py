@@ -9,7 +9,7 @@ from typing import Any
 
 from softehl.codegen.abi import TargetError, Task
 from softehl.codegen.elements import cells
-from softehl.codegen.elements.cells import Element
+from softehl.codegen.elements.element import Element
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, patch_mesh
@@ -93,9 +93,7 @@ def _kind(page: ElementInterface) -> Element:
 
 def _corners(kind: Element) -> Element:
     """The cell of order 1 with the same corners."""
-    number = {"line": "2", "tri": "3", "quad": "4", "tet": "4", "wedge": "6", "hex": "8"}
-    family = kind.name.rstrip("0123456789")
-    return cells.element(family + number[family])
+    return cells.linear(kind)
 
 
 def _parent(kind: Element) -> list[list[float]]:

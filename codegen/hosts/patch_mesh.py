@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import permutations, product
 
-from softehl.codegen.elements.cells import Element
+from softehl.codegen.elements.element import Element
 from softehl.codegen.hosts.element_interface import ElementInterface
 
 Place = tuple[Fraction, ...]
@@ -51,14 +51,31 @@ def _exact(place: tuple[object, ...]) -> Place:
 
 def _parts(kind: Element) -> Iterator[Map]:
     """Maps from the parent cell to its parts of the unit cube."""
-    d = kind.dimension
-    if min(c for p in kind.nodes for c in p) < 0 and kind.name != "wedge6":
-        yield lambda p: tuple((1 + c) / 2 for c in p)
-    elif kind.name == "wedge6":
+    if kind.cell.name == "wedge":
         for part in _simplices(2):
             yield lambda p, part=part: (*part(p[:2]), (1 + p[2]) / 2)  # type: ignore[misc]
+    elif kind.cell.name == "pyramid":
+        yield from _pyramids()
+    elif any(kind.cell.collapse):
+        yield from _simplices(kind.dimension)
     else:
-        yield from _simplices(d)
+        yield lambda p: tuple((1 + c) / 2 for c in p)
+
+
+def _pyramids() -> Iterator[Map]:
+    """Maps of the pyramid to the six of the cube that have its faces and its middle."""
+    half = Fraction(1, 2)
+    for axis, end in product(range(3), (0, 1)):
+
+        def affine(p: Place, axis: int = axis, end: int = end) -> Place:
+            x, y, height = p if end == 0 else (p[1], p[0], p[2])
+            place = [half * (1 + x), half * (1 + y)]
+            place.insert(axis, half * height if end == 0 else 1 - half * height)
+            if axis == 1:
+                place[0], place[2] = place[2], place[0]
+            return tuple(place)
+
+        yield affine
 
 
 def _simplices(d: int) -> Iterator[Map]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.elements.cells import Element
+from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.elements.shapes import interpolate
 from softehl.codegen.language.definition import Component

@@ -16,7 +16,7 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.elements.cells import Element
+from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.language.definition import Component
 from softehl.codegen.language.errors import Elsewhere, ModelError, NeedsElement

@@ -92,13 +92,13 @@ def _require_parent(m: Model, size: int, parent: Any) -> None:
             f"and {size} coordinates"
         )
     known = cells.of(m.nodes, m.rule.dimension)
-    if known is None or known[1].fits(m.rule):
+    if known is None or known.cell.fits(m.rule):
         return
     places = {s: sp.Rational(1, 7 + 2 * k) for k, s in enumerate(m.point())}
     found = [sp.sympify(g).subs(places) for row in parent for g in row]
-    if found == [g for row in known[0].gradient(*places.values()) for g in row]:
+    if found == [g for row in known.gradient(*places.values()) for g in row]:
         raise ModelError(
-            f"{m.name} has shape functions of {known[0].name}, but {cells.misfit(known[1])}"
+            f"{m.name} has shape functions of {known.name}, but {cells.misfit(known.cell)}"
         )
 
 

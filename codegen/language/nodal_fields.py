@@ -9,23 +9,15 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.elements.cells import ELEMENTS, SHAPES, Element
+from softehl.codegen.elements.cells import ELEMENTS, linear
+from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.elements.shapes import interpolate
 from softehl.codegen.language.definition import Component, Definition
 from softehl.codegen.language.fields import Fields, Traced
 from softehl.codegen.language.model import Model
 
-CORNERS = {
-    "line3": "line2",
-    "tri6": "tri3",
-    "quad8": "quad4",
-    "quad9": "quad4",
-    "tet10": "tet4",
-    "hex20": "hex8",
-    "hex27": "hex8",
-    **{name: SHAPES[shape][0] for shape in SHAPES for name in SHAPES[shape][2:]},
-}
+CORNERS = {e.name: linear(e).name for e in ELEMENTS.values() if e.order > 1}
 """The linear element with the corners of one of higher order."""
 
 

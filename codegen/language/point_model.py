@@ -11,7 +11,7 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.elements.cells import Element
+from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import point_rule
 from softehl.codegen.graph.differentiation import gradient
 from softehl.codegen.graph.graph import Input, Node, Op

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from types import CodeType
 from typing import Any, Literal, TypeVar, get_args, overload
 
-from softehl.codegen.elements import quadrature
-from softehl.codegen.elements.cells import Element, element
+from softehl.codegen.elements.cells import element
+from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.language.boundary_model import BoundaryModel
 from softehl.codegen.language.cell_model import CellModel
@@ -245,14 +245,7 @@ class Page:
 
 def rule_of(cell: Element, degree: int) -> QuadratureRule:
     """A rule of a cell for polynomials of a degree (in each direction of a square or cube)."""
-    name = cell.name.rstrip("0123456789")
-    if name == "tri":
-        return quadrature.triangle(degree)
-    if name == "tet":
-        return quadrature.tetrahedron(degree)
-    if name == "wedge":
-        return quadrature.wedge(degree)
-    return quadrature.gauss(degree // 2 + 1, cell.dimension)
+    return cell.cell.rule(degree)
 
 
 def space_of(geometry: str, dimension: int) -> int:

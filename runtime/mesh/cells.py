@@ -1,49 +1,32 @@
-"""The kinds of cells: parent nodes, shape functions and faces, in the node order of meshio.
+"""Cells by name: nodes, shape functions, faces and quadrature, read from the compiler's table.
 
-It is that of VTK, but for wedges. Corners first, then the middles of edges, of faces, of the cell.
-Quadrilaterals and hexahedra live on [-1, 1]^d, triangles and tetrahedra on the unit simplex, wedges
-on triangle x [-1, 1]. Lines, quadrilaterals and hexahedra of order 3 to 6 have the nodes of Gauss
-and Lobatto along every line; those inside an edge, a face or the cell follow one another with x
-running first, then y, then z.
+`generated/cells.json` is written from the exact definitions in `codegen/elements`. The node order
+is that of meshio, which is that of VTK but for wedges: corners first, then the middles of edges,
+of faces, of the cell. Quadrilaterals and hexahedra live on [-1, 1]^d, triangles and tetrahedra on
+the unit simplex, wedges on triangle x [-1, 1], pyramids on the square with the apex (0, 0, 1).
+Lines, quadrilaterals and hexahedra of order 3 to 6 have the nodes of Gauss and Lobatto along every
+line; those inside an edge, a face or the cell follow one another with x running first, then y,
+then z.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import product
-from math import factorial
-from typing import TypeAlias
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.polynomial import Legendre
 from scipy.special import roots_jacobi, roots_legendre
 
 from softehl.runtime.arrays import Array, Integers
 
 Groups: TypeAlias = tuple[tuple[int, ...], ...]
-_Kind: TypeAlias = tuple[str, str, Groups, Groups, tuple[str, ...]]
 
-_ENDS = ((-1,), (1,))
-_SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-_CUBE = tuple((*p, z) for z in (-1, 1) for p in _SQUARE)
-_TRIANGLE = ((0, 0), (1, 0), (0, 1))
-_TETRAHEDRON = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
-_WEDGE = tuple((*p, z) for z in (-1, 1) for p in _TRIANGLE)
-_CUBE_EDGES = (
-    *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)),
-    *((0, 4), (1, 5), (2, 6), (3, 7)),
-)
-_CUBE_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
-
-_TETRAHEDRON_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
-_LINE_SIDES = ((0,), (1,))
-_TRIANGLE_SIDES = ((0, 1), (1, 2), (2, 0))
-_SQUARE_SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))
-_TETRAHEDRON_SIDES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
-_CUBE_SIDES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-_WEDGE_SIDES = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
+_TABLE = Path(__file__).resolve().parents[2] / "generated" / "cells.json"
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,35 +34,54 @@ class Cell:
     """A kind of cell.
 
     name: of this kind, such as "quad8"; meshio: the name that meshio gives it. nodes: (k, dim)
-    parent coordinates. exponents: of the k monomials that the shape functions are made of.
-    corners: how many of the nodes. sides: corners of each face, seen from outside
-    counterclockwise (in 2-D: along the boundary with the cell on the left). faces: the kinds that
-    faces can be.
+    parent coordinates. exponents: of the monomials that span the shape functions; one more than the
+    coordinates is the exponent of 1 - zeta; none for products of lines of order 3 and more.
+    coefficients: (monomials, k), column a holds those of shape function a. corners: how many of the
+    nodes. order: of the shape functions along an edge. lower, collapse: coordinate d runs from 0 or
+    -s_d to s_d, where s_d is 1 minus the coordinates that collapse[d] names. sides: corners of each
+    face, seen from outside counterclockwise (in 2-D: along the boundary with the cell on the left).
+    faces: the kinds that faces can be. gmsh, abaqus: number and names in files; gmsh_nodes,
+    abaqus_nodes: our nodes as numbers of theirs, empty if the order is ours.
     """
 
     name: str
     meshio: str
     nodes: Array
-    exponents: tuple[tuple[int, ...], ...]
+    exponents: Groups
+    coefficients: Array
     corners: int
-    sides: tuple[tuple[int, ...], ...] = ()
+    order: int = 1
+    lower: tuple[int, ...] = ()
+    collapse: Groups = ()
+    sides: Groups = ()
     faces: tuple[str, ...] = ()
+    gmsh: int = 0
+    gmsh_nodes: tuple[int, ...] = ()
+    abaqus: tuple[str, ...] = ()
+    abaqus_nodes: tuple[int, ...] = ()
+    vtk_mirrored: bool = False
 
     @property
     def dimension(self) -> int:
         """Of the parent element."""
         return int(self.nodes.shape[1])
 
+    @property
+    def is_simplex(self) -> bool:
+        """True for points, lines, triangles and tetrahedra."""
+        return self.corners == self.dimension + 1
+
     @cached_property
-    def _coefficients(self) -> Array:
-        """(monomials, k): column a holds the coefficients of shape function a."""
-        return np.asarray(np.linalg.inv(_monomials(self.nodes, self.exponents)), dtype=np.float64)
+    def collapsed(self) -> tuple[int, ...]:
+        """Coordinates that shrink others or are shrunk."""
+        shrunk = {d for d, by in enumerate(self.collapse) if by}
+        return tuple(sorted(shrunk.union(*self.collapse)))
 
     def shape(self, at: Array) -> Array:
         """Shape functions (q, k) at parent points (q, dim)."""
         if not self.exponents:
             return self._products(np.asarray(at, dtype=np.float64), None)
-        return _monomials(at, self.exponents) @ self._coefficients
+        return _monomials(at, self.exponents) @ self.coefficients
 
     def gradient(self, at: Array) -> Array:
         """Their derivatives (q, k, dim) by the parent coordinates."""
@@ -89,8 +91,17 @@ class Cell:
         parts = []
         for d in range(self.dimension):
             factor = [e[d] for e in self.exponents]
-            lowered = [tuple(max(e - (i == d), 0) for i, e in enumerate(x)) for x in self.exponents]
-            parts.append((_monomials(at, lowered) * factor) @ self._coefficients)
+            lowered = [
+                tuple(max(e - (i == d), 0) if i < self.dimension else e for i, e in enumerate(x))
+                for x in self.exponents
+            ]
+            part = (_monomials(at, lowered) * factor) @ self.coefficients
+            if d == self.dimension - 1 < len(self.exponents[0]) - 1:  # also of powers of 1 - zeta
+                lowered = [(*x[:-1], x[-1] - 1) if x[-1] else x for x in self.exponents]
+                part += (_monomials(at, lowered) * [-x[-1] for x in self.exponents]) @ (
+                    self.coefficients
+                )
+            parts.append(part)
         return np.stack(parts, axis=2)
 
     @cached_property
@@ -103,13 +114,6 @@ class Cell:
     def lines(self) -> Integers:
         """Numbers of nodes of the line along the directions, (k, dim), of a product of lines."""
         return np.asarray(np.abs(self.nodes[:, :, None] - self.line).argmin(axis=2))
-
-    @property
-    def order(self) -> int:
-        """Of the shape functions along an edge."""
-        if len(self.nodes) == self.corners:
-            return 1
-        return 2 if self.exponents else len(self.line) - 1
 
     def _products(self, at: Array, by: int | None) -> Array:
         """Products (q, k) of Lagrange's polynomials; along `by` their derivatives."""
@@ -142,15 +146,40 @@ class Cell:
 
     def holds(self, at: Array, margin: float) -> bool:
         """True if a parent point (dim,) lies in the parent element, or no further out than that."""
-        if self.corners == 2**self.dimension:
-            return bool(np.abs(at).max(initial=0.0) <= 1.0 + margin)
-        flat = at if self.corners == self.dimension + 1 else at[:2]
-        inside = flat.min() >= -margin and flat.sum() <= 1.0 + margin
-        return bool(inside and (flat is at or abs(at[2]) <= 1.0 + margin))
+        for x, low, by in zip(at, self.lower, self.collapse, strict=True):
+            upper = 1.0 - sum(at[e] for e in by)
+            if not low * upper - margin <= x <= upper + margin:
+                return False
+        return True
+
+    def clipped(self, at: Array, margin: float) -> Array:
+        """Parent points (m, dim) taken into the parent element, or no further out than that."""
+        if not self.collapsed:
+            return np.clip(at, -1.0 - margin, 1.0 + margin)
+        inside = at.copy()
+        for d in range(self.dimension):
+            if d not in self.collapsed:
+                inside[:, d] = np.clip(at[:, d], -1.0 - margin, 1.0 + margin)
+        if any(self.lower[d] for d in self.collapsed):  # a pyramid: the height first
+            inside[:, 2] = np.clip(at[:, 2], -margin, 1.0 - _APEX)
+            half = 1.0 - inside[:, 2:] + margin
+            inside[:, :2] = np.clip(at[:, :2], -half, half)
+            return inside
+        size = len(self.collapsed)
+        weights = np.maximum(at[:, :size], -margin)
+        total = weights.sum(axis=1, keepdims=True)
+        over = np.maximum(total - 1.0 - margin, 0.0)
+        inside[:, :size] = weights
+        if margin == 0.0:
+            scaled = weights / np.where(over > 0.0, total, 1.0)
+            inside[:, :size] = np.where(over > 0.0, scaled, weights)
+        else:
+            inside[:, :size] -= over / size
+        return inside
 
     def rule(self, degree: int) -> tuple[Array, Array]:
         """Points (q, dim) and weights (q,) that integrate polynomials of a degree exactly."""
-        return _rule(self.corners, self.dimension, degree)
+        return _rule(self.lower, self.collapse, degree)
 
     def measured_rule(self, degree: int, *, ring: bool = False) -> tuple[Array, Array]:
         """A rule, exact for polynomials of a degree times the volume of bent cells.
@@ -158,8 +187,8 @@ class Cell:
         The volume per parent volume, or the normal of a face, is a polynomial: the determinant
         of slopes of the shape functions. ring: times the radius, as on rings.
         """
-        order, simplex = self.order, self.corners == self.dimension + 1
-        volume = self.dimension * order - (self.dimension if simplex else 1)
+        order = self.order
+        volume = self.dimension * order - (self.dimension if self.is_simplex else 1)
         return self.rule(degree + max(volume, 0) + (order if ring else 0))
 
 
@@ -174,145 +203,100 @@ def lagrange(nodes: Array, x: Array) -> tuple[Array, Array]:
 
 
 def lobatto(order: int) -> Array:
-    """Points of Gauss and Lobatto on [-1, 1], (order + 1,), rising."""
-    inside = np.sort(Legendre.basis(order).deriv().roots().real)
-    inside = 0.5 * (inside - inside[::-1])  # exactly symmetric
-    return np.concatenate([[-1.0], inside, [1.0]])
+    """Points of Gauss and Lobatto on [-1, 1], (order + 1,), rising; order 1 to 6."""
+    return np.sort(CELLS[f"line{order + 1}"].nodes[:, 0])
 
 
 def _monomials(at: Array, exponents: Sequence[tuple[int, ...]]) -> Array:
-    """(q, monomials) values of products of powers at points (q, dim)."""
-    powers = np.asarray(exponents)
-    return np.asarray(np.prod(np.asarray(at)[:, None, :] ** powers[None], axis=2))
+    """(q, monomials) values of products of powers at points (q, dim), and of 1 - the last
+    coordinate where there is one exponent more; 0 at the apex, where both factors are 0.
+    """
+    powers, at = np.asarray(exponents), np.asarray(at)
+    if powers.shape[1] == at.shape[1]:
+        return np.asarray(np.prod(at[:, None, :] ** powers[None], axis=2))
+    depth = 1.0 - at[:, -1:]
+    polynomial = np.prod(at[:, None, :] ** powers[None, :, :-1], axis=2)
+    quotient = np.where(depth == 0.0, 1.0, depth) ** powers[:, -1].astype(float)
+    return np.where((depth == 0.0) & (powers[:, -1] < 0), 0.0, polynomial * quotient)
 
 
 @cache
-def _rule(corners: int, dimension: int, degree: int) -> tuple[Array, Array]:
+def _rule(lower: tuple[int, ...], collapse: Groups, degree: int) -> tuple[Array, Array]:
+    """Rule of a cube with collapsed faces: the Jacobian is the weight of Gauss and Jacobi."""
     n = degree // 2 + 1
-    line = roots_legendre(n)
-    if corners == 2**dimension:
-        return _tensor([line] * dimension)
-    if dimension == 3 and corners == 6:
-        (flat, a), (z, b) = _rule(3, 2, degree), line
-        points = np.array([(*p, t) for p in flat for t in z])
-        return points, np.outer(a, b).ravel()
-    # a simplex is a cube with collapsed faces; the Jacobian is the weight of Gauss and Jacobi
-    half = [roots_jacobi(n, power, 0.0) for power in range(dimension)]
-    points, weights = _tensor([((x + 1) / 2, w / 2 ** (k + 1)) for k, (x, w) in enumerate(half)])
+    factors = []
+    for d, low in enumerate(lower):
+        power = sum(d in by for by in collapse)
+        if low:
+            factors.append(roots_legendre(n))
+        else:
+            x, w = roots_jacobi(n, power, 0.0)
+            factors.append(((x + 1) / 2, w / 2 ** (power + 1)))
+    points, weights = _tensor(factors)
     collapsed = points.copy()
-    for d in range(dimension):
-        collapsed[:, d] *= np.prod(1.0 - points[:, d + 1 :], axis=1)
-    assert abs(weights.sum() * factorial(dimension) - 1.0) < 1e-12
+    for d, by in enumerate(collapse):
+        collapsed[:, d] *= np.prod(1.0 - points[:, list(by)], axis=1)
     return collapsed, weights
 
 
 def _tensor(factors: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Products of rules on lines."""
     points = np.array(list(product(*(x for x, _ in factors))))
     weights = np.array([np.prod(w) for w in product(*(w for _, w in factors))])
     return points, weights
 
 
-def _means(corners: Sequence[tuple[int, ...]], groups: Sequence[tuple[int, ...]]) -> Array:
-    """The corners and the means of groups of them."""
-    first = np.array(corners, dtype=np.float64)
-    return np.vstack([first, *(first[list(g)].mean(axis=0)[None] for g in groups)])
+def _read_cells() -> dict[str, Cell]:
+    """Points, and all cells of the table."""
+    point = Cell(
+        name="point1",
+        meshio="vertex",
+        nodes=np.zeros((1, 0)),
+        exponents=((),),
+        coefficients=np.ones((1, 1)),
+        corners=1,
+        gmsh=15,
+        abaqus=("MASS",),
+    )
+    table = json.loads(_TABLE.read_text(encoding="utf-8"))
+    return {"point1": point, **{name: _cell(name, row) for name, row in table.items()}}
 
 
-def _between(corners: Sequence[tuple[int, ...]], groups: Groups, order: int) -> Array:
-    """The corners, and the nodes inside edges, faces and cell, x running first."""
-    inner, nodes = lobatto(order)[1:-1], [np.array(corners, dtype=np.float64)]
-    for group in groups:
-        end_values = [sorted({corners[k][d] for k in group}) for d in range(len(corners[0]))]
-        lines = [
-            inner if len(some) > 1 else np.array(some, dtype=np.float64) for some in end_values
-        ]
-        nodes.append(np.array([point[::-1] for point in product(*reversed(lines))]))
-    return np.vstack(nodes)
+def _cell(name: str, row: dict[str, Any]) -> Cell:
+    if "line" in row:
+        nodes = np.array(row["line"])[np.array(row["lines"])]
+    else:
+        nodes = np.array(row["nodes"])
+    return Cell(
+        name=name,
+        meshio=row["meshio"],
+        nodes=nodes,
+        exponents=_groups(row.get("exponents", ())),
+        coefficients=np.array(row.get("coefficients", np.empty((0, 0)))),
+        corners=row["corners"],
+        order=row["order"],
+        lower=tuple(row["lower"]),
+        collapse=_groups(row["collapse"]),
+        sides=_groups(row["sides"]),
+        faces=tuple(row["faces"]),
+        gmsh=row["gmsh"][0],
+        gmsh_nodes=tuple(row["gmsh"][1]),
+        abaqus=tuple(row["abaqus"][0]),
+        abaqus_nodes=tuple(row["abaqus"][1]),
+        vtk_mirrored=row["vtk_mirrored"],
+    )
 
 
-def _high(shape: str, corners: Groups, sides: Groups, groups: Groups) -> list[Cell]:
-    """Products of lines of order 3 to 6."""
-    kinds, dimension = [], len(corners[0])
-    file = {"line": "line", "quad": "quad", "hex": "hexahedron"}[shape]
-    face = {"line": "", "quad": "line", "hex": "quad"}[shape]
-    for order in range(3, HIGHEST + 1):
-        count = (order + 1) ** dimension
-        faces = f"{face}{(order + 1) ** (dimension - 1)}" if face else "point1"
-        nodes = _between(corners, groups, order)
-        name = f"{shape}{count}"
-        kinds.append(Cell(name, f"{file}{count}", nodes, (), len(corners), sides, (faces,)))
-    return kinds
+def _groups(rows: Sequence[Sequence[int]]) -> Groups:
+    return tuple(map(tuple, rows))
 
 
-def _powers(dimension: int, largest: int, total: int, squares: int) -> tuple[tuple[int, ...], ...]:
-    """Exponents up to `largest`, of a `total` degree at most, at most so many of them squares."""
-    every = product(range(largest + 1), repeat=dimension)
-    return tuple(e for e in every if sum(e) <= total and e.count(2) <= squares)
-
-
-def _family(corners: Groups, sides: Groups, kinds: Sequence[_Kind]) -> list[Cell]:
-    """Kinds of one shape."""
-    return [
-        Cell(name, file, _means(corners, groups), powers, len(corners), sides, faces)
-        for name, file, groups, powers, faces in kinds
-    ]
-
-
-def _cells() -> dict[str, Cell]:
-    quad9_groups: Groups = (*_SQUARE_SIDES, tuple(range(4)))
-    hex27_groups: Groups = (*_CUBE_EDGES, *_CUBE_FACES, tuple(range(8)))
-    wedge = tuple((*a, b) for b in (0, 1) for a in _powers(2, 1, 1, 0))
-    kinds = [
-        Cell("point1", "vertex", np.zeros((1, 0)), ((),), 1),
-        *_family(
-            *(_ENDS, _LINE_SIDES),
-            [
-                ("line2", "line", (), _powers(1, 1, 1, 0), ("point1",)),
-                ("line3", "line3", ((0, 1),), _powers(1, 2, 2, 1), ("point1",)),
-            ],
-        ),
-        *_family(
-            *(_TRIANGLE, _TRIANGLE_SIDES),
-            [
-                ("tri3", "triangle", (), _powers(2, 1, 1, 0), ("line2",)),
-                ("tri6", "triangle6", _TRIANGLE_SIDES, _powers(2, 2, 2, 1), ("line3",)),
-            ],
-        ),
-        *_family(
-            *(_SQUARE, _SQUARE_SIDES),
-            [
-                ("quad4", "quad", (), _powers(2, 1, 2, 0), ("line2",)),
-                ("quad8", "quad8", _SQUARE_SIDES, _powers(2, 2, 4, 1), ("line3",)),
-                ("quad9", "quad9", quad9_groups, _powers(2, 2, 4, 2), ("line3",)),
-            ],
-        ),
-        *_family(
-            *(_TETRAHEDRON, _TETRAHEDRON_SIDES),
-            [
-                ("tet4", "tetra", (), _powers(3, 1, 1, 0), ("tri3",)),
-                ("tet10", "tetra10", _TETRAHEDRON_EDGES, _powers(3, 2, 2, 1), ("tri6",)),
-            ],
-        ),
-        *_family(
-            *(_CUBE, _CUBE_SIDES),
-            [
-                ("hex8", "hexahedron", (), _powers(3, 1, 3, 0), ("quad4",)),
-                ("hex20", "hexahedron20", _CUBE_EDGES, _powers(3, 2, 6, 1), ("quad8",)),
-                ("hex27", "hexahedron27", hex27_groups, _powers(3, 2, 6, 3), ("quad9",)),
-            ],
-        ),
-        *_high("line", _ENDS, _LINE_SIDES, ((0, 1),)),
-        *_high("quad", _SQUARE, _SQUARE_SIDES, quad9_groups),
-        *_high("hex", _CUBE, _CUBE_SIDES, hex27_groups),
-        *_family(_WEDGE, _WEDGE_SIDES, [("wedge6", "wedge", (), wedge, ("tri3", "quad4"))]),
-    ]
-    return {cell.name: cell for cell in kinds}
-
-
+_APEX = 1e-12
+"""Distance from the apex of a pyramid at which its shape functions still have gradients."""
 HIGHEST = 6
 """Order of shape functions up to which there are lines, quadrilaterals and hexahedra."""
 _LINEAR = {(1, 0): "point1", (2, 1): "line2", (3, 2): "tri3", (4, 2): "quad4"}
-CELLS = _cells()
+CELLS = _read_cells()
 """Every kind of cell by its name."""
 
 BY_FILE = {cell.meshio: cell for cell in CELLS.values()}
@@ -321,7 +305,7 @@ BY_FILE = {cell.meshio: cell for cell in CELLS.values()}
 
 def for_vtk(kind: str, nodes: Integers) -> Integers:
     """Nodes (n, k) of cells in VTK's order: the first triangle of a wedge looks outwards."""
-    return nodes[:, list(CELLS[kind].mirrored)] if kind == "wedge6" else nodes
+    return nodes[:, list(CELLS[kind].mirrored)] if CELLS[kind].vtk_mirrored else nodes
 
 
 def jacobians(cell: Cell, places: Array, at: Array) -> Array:

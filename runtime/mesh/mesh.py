@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 Faces: TypeAlias = Mapping[str, Integers]
 """Kind of face -> node numbers (n, k), seen from outside counterclockwise."""
-Shape = Literal["quad", "serendipity", "triangle", "hex", "tetrahedron", "wedge"]
+Shape = Literal["quad", "serendipity", "triangle", "hex", "tetrahedron", "wedge", "pyramid"]
 Predicate = Callable[[Array], Flags]
 """Of places (n, dim): which of them are meant, (n,)."""
 
@@ -241,10 +241,11 @@ class Mesh:
         cells : tuple of int
             Number of cells along x, y and z.
         order : int
-            Order of the cells, 1 to 6 of "hex", 1 and 2 of "tetrahedron", 1 of "wedge".
+            Order of the cells, 1 to 6 of "hex", 1 and 2 of "tetrahedron" and "wedge", 1 of
+            "pyramid".
         shape : str
             "hex" (hex8, hex27, up to hex343), "serendipity" (hex20), "tetrahedron" (tet4, tet10) or
-            "wedge" (wedge6).
+            "wedge" (wedge6, wedge15), "pyramid" (pyramid5).
         spread : bool
             Under mpirun every process makes its own part only (docs/cluster.md); one process makes
             the whole.

@@ -218,7 +218,7 @@ def _bulge(kind: str) -> float:
             1.05 * float(np.abs(lagrange(cell.line, line)[0]).sum(axis=1).max()) ** cell.dimension
         )
     at = np.stack(np.meshgrid(*[line] * cell.dimension), -1)
-    at = _clipped(cell, at.reshape(-1, cell.dimension), 0.0)
+    at = cell.clipped(at.reshape(-1, cell.dimension), 0.0)
     return 1.05 * float(np.abs(cell.shape(at)[:, cell.corners :]).sum(axis=1).max())
 
 
@@ -240,12 +240,12 @@ def _inverse(cell: Cell, x: Array, places: Array, near: float) -> tuple[Array, A
         improved = again[better < distance[again]]
         xi[improved] = other[better < distance[again]]
         distance = _distance(cell, x, places, xi)
-    return _clipped(cell, xi, 0.0), distance
+    return cell.clipped(xi, 0.0), distance
 
 
 def _distance(cell: Cell, x: Array, places: Array, xi: Array) -> Array:
     """Distances (m,) of the places from the points of the cells at xi, taken into the cells."""
-    feet = np.einsum("mk,mkd->md", cell.shape(_clipped(cell, xi, 0.0)), x)
+    feet = np.einsum("mk,mkd->md", cell.shape(cell.clipped(xi, 0.0)), x)
     return np.asarray(np.linalg.norm(feet - places, axis=1))
 
 
@@ -257,7 +257,7 @@ def _newton(cell: Cell, x: Array, places: Array, xi: Array) -> Array:
     for _ in range(_ITERATIONS):
         miss = places[active] - np.einsum("mk,mkd->md", cell.shape(xi[active]), x[active])
         slope = np.einsum("mkc,mkd->mdc", cell.gradient(xi[active]), x[active])
-        new = _clipped(cell, xi[active] + _solved(slope, miss), _BEYOND)
+        new = cell.clipped(xi[active] + _solved(slope, miss), _BEYOND)
         moving = np.abs(new - xi[active]).max(axis=1) > _STEADY
         xi[active] = new
         active = active[moving]
@@ -280,24 +280,3 @@ def _solved(slope: Array, miss: Array) -> Array:
         slope = np.where(singular[:, None, None], np.eye(c), slope)
         miss = np.where(singular[:, None], 0.0, miss)
     return np.asarray(np.linalg.solve(slope, miss[:, :, None])[:, :, 0])
-
-
-def _clipped(cell: Cell, xi: Array, beyond: float) -> Array:
-    """Parent points (m, d) taken into the parent element, or no further out than that."""
-    if cell.corners == 2**cell.dimension:
-        return np.clip(xi, -1.0 - beyond, 1.0 + beyond)
-    flat = 3 if cell.corners == 4 else 2  # coordinates of the simplex
-    clipped = xi.copy()
-    barycentric = np.maximum(xi[:, :flat], -beyond)
-    total = barycentric.sum(axis=1, keepdims=True)
-    over = np.maximum(total - 1.0 - beyond, 0.0)
-    clipped[:, :flat] = barycentric
-    if beyond == 0.0:
-        clipped[:, :flat] = np.where(
-            over > 0.0, barycentric / np.where(over > 0.0, total, 1.0), barycentric
-        )
-    else:
-        clipped[:, :flat] -= over / flat
-    if cell.corners == 6:
-        clipped[:, 2] = np.clip(xi[:, 2], -1.0 - beyond, 1.0 + beyond)
-    return clipped

@@ -23,7 +23,8 @@ KINDS = {
     (3, "hex"): ("hex8", "hex27", "hex64", "hex125", "hex216", "hex343"),
     (3, "serendipity"): ("", "hex20"),
     (3, "tetrahedron"): ("tet4", "tet10"),
-    (3, "wedge"): ("wedge6", ""),
+    (3, "wedge"): ("wedge6", "wedge15"),
+    (3, "pyramid"): ("pyramid5", ""),
 }
 """(dimension, shape) -> kinds of order 1, 2, ..."""
 
@@ -43,6 +44,7 @@ def grid(
     """A line, rectangle or box from the origin; spread: this process's part.  Raises MeshError."""
     dimension = len(size)
     kind = _kind(dimension, order, shape)
+    order = 2 if shape == "pyramid" else order  # its grid of nodes has the middles of boxes
     counts = [n for n in map(count_of, np.ravel(np.asarray(cells, dtype=object))) if n]
     if len(counts) != dimension or np.size(cells) != dimension:
         raise MeshError(f"cells = {cells}: {dimension} whole numbers of at least 1 are needed")
@@ -104,7 +106,7 @@ def _kind(dimension: int, order: int, shape: str) -> str:
     kinds = KINDS[dimension, shape]
     kind = kinds[order - 1] if order in range(1, len(kinds) + 1) else ""
     if not kind:
-        suffixes = {"serendipity": "2", "wedge": "1"}
+        suffixes = {"serendipity": "2", "pyramid": "1"}
         orders = suffixes.get(shape, "1 or 2" if len(kinds) == 2 else f"1 to {len(kinds)}")
         raise MeshError(f"order = {order}: {shape} cells have order {orders}")
     return kind
@@ -117,8 +119,10 @@ def _numbers(kind: str, counts: Sequence[int], order: int) -> Integers:
     origins = sum(s.ravel(order="F") * stride for s, stride in zip(steps, strides, strict=True))
     if kind[:3] in ("tri", "tet"):
         parts = [_simplex(kind, corners) for corners in _simplices(len(counts))]
-    elif kind == "wedge6":
-        parts = [_wedge(corners) for corners in _simplices(2)]
+    elif kind.startswith("wedge"):
+        parts = [_wedge(kind, corners) for corners in _simplices(2)]
+    elif kind.startswith("pyramid"):
+        parts = _pyramids()
     else:
         rank = np.argsort(np.argsort(CELLS[kind].line)) if order > 2 else np.empty(0)
         parts = [rank[CELLS[kind].lines] / order if order > 2 else 0.5 * (CELLS[kind].nodes + 1.0)]
@@ -141,9 +145,16 @@ def _simplices(dimension: int) -> list[Array]:
     return simplices
 
 
-def _wedge(triangle: Array) -> Array:
+def _wedge(kind: str, triangle: Array) -> Array:
     """Nodes of a prism over a triangle (3, 2) of the unit square."""
-    return np.vstack([np.column_stack([triangle, np.full(3, z)]) for z in (0.0, 1.0)])
+    nodes = CELLS[kind].nodes
+    return np.column_stack([CELLS["tri3"].shape(nodes[:, :2]) @ triangle, 0.5 * (nodes[:, 2] + 1)])
+
+
+def _pyramids() -> list[Array]:
+    """Nodes of the six pyramids of the unit cube, from its faces to its middle."""
+    corners = 0.5 * (CELLS["hex8"].nodes + 1.0)
+    return [np.vstack([corners[list(side[::-1])], [[0.5] * 3]]) for side in CELLS["hex8"].sides]
 
 
 def _simplex(kind: str, corners: Array) -> Array:

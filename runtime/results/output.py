@@ -14,6 +14,7 @@ from softehl.runtime.definition.problem_definition import Block
 from softehl.runtime.discretisation.dofmap import AXES
 from softehl.runtime.io import replacing, write_text
 from softehl.runtime.mesh.cells import CELLS, for_vtk
+from softehl.runtime.mesh.readers.meshio import import_meshio
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +63,7 @@ class Picture:
 
     def write(self, path: Path) -> None:
         """Write .vtu, atomically."""
-        import meshio  # late: it is slow to import
-
+        meshio = import_meshio()
         small = {kind: _small(kind, nodes) for kind, nodes in self.cells.items()}
         found = meshio.Mesh(
             np.pad(self.points, ((0, 0), (0, 3 - self.points.shape[1]))),
@@ -101,8 +101,6 @@ class Picture:
 def _small(kind: str, nodes: Integers) -> tuple[str, Integers]:
     """Cells for a file; those of order 3 and more as linear ones between their nodes."""
     cell = CELLS[kind]
-    if kind == "wedge6":  # VTK's first triangle runs the other way round
-        return cell.meshio, nodes[:, list(cell.mirrored)]
     if cell.exponents:
         return cell.meshio, for_vtk(kind, nodes)
     linear = CELLS[{1: "line2", 2: "quad4", 3: "hex8"}[cell.dimension]]

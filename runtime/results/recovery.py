@@ -79,12 +79,8 @@ def _is_of(rule: Rule, cell: Cell) -> bool:
 
 def _powers(cell: Cell, degree: int) -> list[tuple[int, ...]]:
     """Exponents up to a degree: of the sum on simplices, in each direction of squares and cubes."""
-    if cell.corners == 2**cell.dimension:
-        simplex = 0
-    else:
-        simplex = cell.dimension if cell.corners == cell.dimension + 1 else 2
     every = product(range(degree + 1), repeat=cell.dimension)
-    return [e for e in every if sum(e[:simplex]) <= degree]
+    return [e for e in every if sum(e[d] for d in cell.collapsed) <= degree]
 
 
 def _monomials(at: Array, powers: list[tuple[int, ...]]) -> Array:

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from softehl.cases.shipped import solve_cases
     from softehl.codegen.abi import BuildError, TargetError
     from softehl.codegen.elements import quadrature, shapes
-    from softehl.codegen.elements.cells import Element, element
+    from softehl.codegen.elements.cells import element
+    from softehl.codegen.elements.element import Element
     from softehl.codegen.elements.quadrature import QuadratureRule
     from softehl.codegen.graph.partial_derivatives import DifferentiationError
     from softehl.codegen.language import kinematics
@@ -176,7 +177,7 @@ _MODELLING = {
     "CacheError": "softehl.codegen.tools.cache_dir",
     "Definition": "softehl.codegen.language.definition",
     "DifferentiationError": "softehl.codegen.graph.partial_derivatives",
-    "Element": "softehl.codegen.elements.cells",
+    "Element": "softehl.codegen.elements.element",
     "Fields": "softehl.codegen.language.fields",
     "Law": "softehl.codegen.language.material",
     "Material": "softehl.codegen.language.material",

@@ -33,7 +33,7 @@ def spring() -> Definition:
 """
 LOAD = """
 import softehl, numpy, os, sys
-from softehl.codegen.tools import cache
+from softehl.codegen.tools import cache_store as cache
 if os.environ.get("NO_LOCKS"):
     cache.fcntl = None
 kernel = softehl.load_kernel("spring.py")

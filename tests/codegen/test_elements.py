@@ -10,7 +10,8 @@ import pytest
 import sympy as sp
 
 from softehl.codegen.elements import quadrature
-from softehl.codegen.elements.cells import ELEMENTS, Element, element
+from softehl.codegen.elements.cells import ELEMENTS, element
+from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.runtime.mesh.cells import CELLS
 
@@ -23,7 +24,11 @@ QUADRATIC = {name: kind for name, kind in ELEMENTS.items() if kind.lines is None
 
 @pytest.mark.parametrize("kind", QUADRATIC.values(), ids=QUADRATIC)
 def test_nodal_and_the_same_as_in_meshes(kind: Element) -> None:
-    values = [kind.shape(*place) for place in kind.nodes]
+    h = sp.Symbol("h")  # at the apex of a pyramid the limit along its axis
+    values = [
+        [sp.sympify(N).subs(h, place[-1]) for N in kind.shape(*place[:-1], h)]
+        for place in kind.nodes
+    ]
     assert sp.Matrix(values) == sp.eye(len(kind.nodes))
     cell, at = CELLS[kind.name], AT[: kind.dimension]
     point = np.array([[float(x) for x in at]])
@@ -73,6 +78,17 @@ def test_wedge_rule() -> None:
     rule = quadrature.wedge(3)
     exact = {(*p, *z): a * b for p, a in simplex(2, 3).items() for z, b in line(3).items()}
     assert degree_of(rule, exact) < 1e-40
+
+
+def test_pyramid_rule() -> None:
+    """x^a y^b z^c over the pyramid: 4 / ((a + 1) (b + 1)) times a beta function."""
+    exact = {}
+    for a, b, c in product((0, 1, 2), (0, 2), (0, 1, 3)):
+        height = sp.beta(c + 1, a + b + 3).doit()
+        area = sp.Rational(4 * (a % 2 == 0), (a + 1) * (b + 1))
+        exact[a, b, c] = area * sp.nsimplify(height)
+    assert degree_of(quadrature.pyramid(7), exact) < 1e-40
+    assert degree_of(quadrature.pyramid(1), exact) > 1e-3
 
 
 def test_what_is_refused() -> None:

@@ -23,8 +23,11 @@ import hashlib
 from softehl.codegen import pipeline
 assert pipeline.__file__.startswith({directory!r}), pipeline.__file__
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import product
-for name, text in product.files(pipeline.compile_model(make()) for make in ALL.values()).items():
+from softehl.codegen.elements import cell_table
+from softehl.codegen.tools import output_files
+files = output_files.files(pipeline.compile_model(make()) for make in ALL.values())
+files[cell_table.NAME] = cell_table.cell_table()
+for name, text in files.items():
     print(name, hashlib.sha256(text.encode()).hexdigest())
 """
 REMEDY = "mend it with: softehl generate"

@@ -10,11 +10,12 @@ import pytest
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import VERTEX_ORDER, Target, TargetError
-from softehl.codegen.elements.cells import ELEMENTS, Element
+from softehl.codegen.elements.cells import ELEMENTS
+from softehl.codegen.elements.element import Element
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.model import Model
 
-NOT_NODAL = ("quad8", "hex20")
+NOT_NODAL = ("quad8", "hex20", "wedge15", "pyramid5")
 NODAL = [name for name in ELEMENTS if ELEMENTS[name].lines is None and name not in NOT_NODAL]
 KINDS = {
     "line": "interval",

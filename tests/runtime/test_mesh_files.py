@@ -162,7 +162,7 @@ REFUSED = {
     "*ELGEN\n1, 2\n": "*ELGEN makes elements by a rule",
     "*SYSTEM\n0, 0, 0\n": "*SYSTEM makes a mesh by a rule",
     "*NODE, SYSTEM=C\n9, 1, 90\n": "SYSTEM=C is not read",
-    "*ELEMENT, TYPE=C3D15\n2, 1\n": "elements C3D15 have no cell here; there are C3D4, C3D10",
+    "*ELEMENT, TYPE=C3D13\n2, 1\n": "elements C3D13 have no cell here; there are C3D8, C3D20",
     "*ELEMENT, TYPE=U1\n2, 1\n": "elements U1 have no cell here",
     "*ELEMENT, TYPE=CPS3\n2, 1, 2\n": "line 9: element 2 has 2 nodes, CPS3 has 3",
     "*ELEMENT, TYPE=CPS3\n2, 1, 2, 3, 4\n": "element 2 has 4 nodes, CPS3 has 3",
@@ -218,7 +218,8 @@ def sorted_rows(rows: Any) -> list[list[int]]:
 
 
 SHAPES = [("quad", 1), ("quad", 2), ("triangle", 1), ("triangle", 2), ("hex", 1), ("hex", 2)]
-SHAPES += [("serendipity", 2), ("tetrahedron", 1), ("tetrahedron", 2), ("wedge", 1)]
+SHAPES += [("serendipity", 2), ("tetrahedron", 1), ("tetrahedron", 2), ("wedge", 1), ("wedge", 2)]
+SHAPES += [("pyramid", 1)]
 
 
 @pytest.mark.parametrize(("shape", "order"), SHAPES)

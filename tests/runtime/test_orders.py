@@ -31,6 +31,11 @@ def fine(cell: Cell) -> tuple[Array, Array]:
     points = np.array(list(product(x, repeat=cell.dimension)))
     weights = np.prod(np.array(list(product(w, repeat=cell.dimension))), axis=1)
     flat = {3: 2, 4: 3, 6: 2}.get(cell.corners, 0) if cell.corners != 2**cell.dimension else 0
+    if cell.corners == 5:
+        points[:, 2], weights = (points[:, 2] + 1) / 2, weights / 2
+        depth = 1 - points[:, 2]
+        points[:, :2] *= depth[:, None]
+        return points, weights * depth**2
     for d in range(flat):
         points[:, d], weights = (points[:, d] + 1) / 2, weights / 2
     for d in range(1, flat):

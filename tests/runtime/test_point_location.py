@@ -13,7 +13,7 @@ from softehl.runtime.mesh.point_location import Located, PointLocator
 
 SHAPES = [("quad", n) for n in range(1, 7)] + [("hex", n) for n in range(1, 7)]
 SHAPES += [("serendipity", 2), ("triangle", 1), ("triangle", 2), ("tetrahedron", 1)]
-SHAPES += [("tetrahedron", 2), ("wedge", 1)]
+SHAPES += [("tetrahedron", 2), ("wedge", 1), ("wedge", 2), ("pyramid", 1)]
 
 
 def bent(shape: str, order: int, cells: int = 2) -> Mesh:

@@ -24,6 +24,8 @@ SHAPES: dict[str, dict[str, Any]] = {
     "tet4": {"shape": "tetrahedron"},
     "tet10": {"shape": "tetrahedron", "order": 2},
     "wedge6": {"shape": "wedge"},
+    "wedge15": {"shape": "wedge", "order": 2},
+    "pyramid5": {"shape": "pyramid"},
     "hex8": {"shape": "hex"},
     "hex20": {"shape": "serendipity", "order": 2},
     "hex27": {"shape": "hex", "order": 2},
@@ -85,7 +87,7 @@ def straightened(mesh: Mesh, name: str) -> Mesh:
 
 
 EVERY = [
-    pytest.param(name, marks=[pytest.mark.slow] if name in ("hex20", "hex27") else [])
+    pytest.param(name, marks=[pytest.mark.slow] if name in ("hex20", "hex27", "wedge15") else [])
     for name in SHAPES
 ]
 
@@ -95,7 +97,7 @@ def test_order_of_convergence(name: str) -> None:
     """-div(grad u) = d pi^2 prod sin(pi x), k = 2: the error in L2 falls with order + 1."""
     errors = []
     sizes = (8, 16) if CELLS[name].dimension < 3 else (4, 8)
-    sizes = (3, 6) if name in ("hex27", "hex20", "tet10") else sizes
+    sizes = (3, 6) if name in ("hex27", "hex20", "tet10", "wedge15") else sizes
     for n in sizes:
         mesh = unit_mesh(name, n)
         study = Study(mesh)

@@ -12,7 +12,7 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from softehl.codegen.elements.cells import Element
+from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.emit.c_printer import number
 

@@ -376,7 +376,7 @@ def choose(layout: Layout, tangent: PointOutputs, operations: int, short: int) -
         return Choice(True, f"local unknowns or functions of stretches, {told}")
     if d.history and layout.points > 1:
         return Choice(True, f"history at {layout.points} points, {told}")
-    simple = d.cell.startswith(("tri", "tet", "wedge"))
+    simple = d.cell.startswith(("tri", "tet", "wedge", "pyramid"))
     limit = LARGE if simple and not d.history else short
     return Choice(whole > limit, f"{told}, limit {limit}")
 

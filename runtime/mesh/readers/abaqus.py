@@ -28,13 +28,14 @@ _GENERATORS = {
     **dict.fromkeys(("SYSTEM", "SYMMETRICMODELGENERATION", "IMPORT"), "a mesh"),
 }
 """Keywords that would make a mesh, and are not read."""
-_SOLID = r"(?:D?C3D|DCC3D|AC3D|F3D|FC3D|EC3D|Q3D)(4|6|8|10|20|27)(?!\d)"
+_SOLIDS = {len(c.nodes): name for name, c in CELLS.items() if c.dimension == 3 and c.abaqus}
+_SOLID = rf"(?:D?C3D|DCC3D|AC3D|F3D|FC3D|EC3D|Q3D)({'|'.join(map(str, _SOLIDS))})(?!\d)"
 _SHELL = r"(?:M3D|SFM3D|R3D|DS|S|STRI)(3|4|6|8|9)(?!\d)"
 _PLANE = (
     r"(?:CPEG|CPE|CPS|CGAX|CAX|DC2D|DCAX|DCC2D|DCCAX|AC2D|ACAX|EC2D|Q2D|QAX)(3|4|6|8|9)(?![\d])"
 )
 _FAMILIES: tuple[tuple[str, str, dict[int, str]], ...] = (
-    ("solid", _SOLID, {4: "tet4", 6: "wedge6", 8: "hex8", 10: "tet10", 20: "hex20", 27: "hex27"}),
+    ("solid", _SOLID, _SOLIDS),
     ("solid", r"(?:SC|CSS)(6|8)(?!\d)", {6: "wedge6", 8: "hex8"}),
     ("plane", _PLANE, {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}),
     ("shell", r"STRI(65)", {65: "tri6"}),
@@ -45,21 +46,13 @@ _FAMILIES: tuple[tuple[str, str, dict[int, str]], ...] = (
     ("line", r"(?:CONN[23]D2|FRAME[23]D|SPRING2|SPRINGA|DASHPOT2|DASHPOTA|GAPUNI)", {}),
     ("point", r"(?:MASS|ROTARYI|SPRING1|DASHPOT1|HEATCAP)", {}),
 )
-_ORDERS = {
-    "line3": (0, 2, 1),
-    "hex27": (*range(20), 26, 24, 23, 25, 21, 22, 20),
-}
-"""Nodes of our cells as numbers of those of Abaqus, where they differ."""
 _TYPES = {
-    2: {
-        **{"tri3": "CPS3", "quad4": "CPS4", "tri6": "CPS6", "quad8": "CPS8", "quad9": "M3D9"},
-        **{"point1": "MASS", "line2": "T2D2", "line3": "T2D3"},
-    },
-    3: {
-        **{"tri3": "S3", "quad4": "S4", "tri6": "STRI65", "quad8": "S8R", "quad9": "S9R5"},
-        **{"tet4": "C3D4", "wedge6": "C3D6", "hex8": "C3D8", "tet10": "C3D10", "hex20": "C3D20"},
-        **{"hex27": "C3D27", "point1": "MASS", "line2": "T3D2", "line3": "T3D3"},
-    },
+    dimension: {
+        name: cell.abaqus[min(dimension, len(cell.abaqus) + 1) - 2]
+        for name, cell in CELLS.items()
+        if cell.abaqus and cell.dimension <= dimension
+    }
+    for dimension in (2, 3)
 }
 """Elements that are written, by the number of coordinates."""
 _ADVICE = "save the mesh with all its nodes and elements written out"
@@ -292,7 +285,7 @@ class _Model:
                     f"{line.place}: element {label} has {len(numbers) - 1} nodes, "
                     f"{keyword.options['TYPE']} has {count}"
                 )
-            nodes = tuple(nodes[k] for k in _ORDERS.get(kind, range(count)))
+            nodes = tuple(nodes[k] for k in CELLS[kind].abaqus_nodes or range(count))
             if existing.setdefault(label, (kind, family, nodes)) != (kind, family, nodes):
                 raise AbaqusError(f"{line.place}: element {label} is given again, as another one")
             labels.append(label)
@@ -411,7 +404,7 @@ def _kind(keyword: _Keyword) -> tuple[str, str]:
             if not kinds:
                 return family, "line2" if family == "line" else "point1"
             return family, kinds[int(match[1])]
-    allowed = ", ".join(_TYPES[3][k] for k in ("tet4", "tet10", "wedge6", "hex8", "hex20", "hex27"))
+    allowed = ", ".join(_TYPES[3][k] for k in _SOLIDS.values())
     raise AbaqusError(
         f"{keyword.place}: elements {name} have no cell here; there are {allowed}, CPS3/4/6/8 and "
         "CPE, CAX, S, M3D likewise, T3D2/3, B31/32 and their variants"
@@ -717,7 +710,7 @@ def text(
 
 
 def _element_lines(kind: str, nodes: Integers, first: int) -> list[str]:
-    order = np.argsort(_ORDERS.get(kind, range(nodes.shape[1])))
+    order = np.argsort(CELLS[kind].abaqus_nodes or range(nodes.shape[1]))
     lines = []
     for label, row in enumerate((nodes[:, order] + 1).tolist(), start=first):
         lines += _rows([label, *row])

@@ -18,18 +18,7 @@ from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.face_matching import firsts
 from softehl.runtime.mesh.readers.file_content import Content
 
-_KINDS = {
-    **{1: "line2", 2: "tri3", 3: "quad4", 4: "tet4", 5: "hex8", 6: "wedge6", 8: "line3"},
-    **{9: "tri6", 10: "quad9", 11: "tet10", 12: "hex27", 15: "point1", 16: "quad8", 17: "hex20"},
-}
-_NUMBERS = {kind: number for number, kind in _KINDS.items()}
-_HEX20 = (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)
-_ORDERS = {
-    "tet10": (*range(8), 9, 8),
-    "hex20": _HEX20,
-    "hex27": (*_HEX20, 22, 23, 21, 24, 20, 25, 26),
-}
-"""Nodes of our cells as numbers of Gmsh's, where they differ."""
+_KINDS = {cell.gmsh: name for name, cell in CELLS.items() if cell.gmsh}
 
 Group = tuple[int, int]
 """Dimension and number of a physical group."""
@@ -280,7 +269,7 @@ def _content(found: _Parts) -> Content:
         if rows.min() < 0:
             raise GmshError(f"a {kind} has a node that is not in the file")
         first, number = firsts(rows)
-        cells[kind] = rows[first][:, list(_ORDERS.get(kind, range(rows.shape[1])))]
+        cells[kind] = rows[first][:, list(CELLS[kind].gmsh_nodes or range(rows.shape[1]))]
         bounds = np.cumsum([len(part) for part in parts])[:-1]
         members: dict[str, list[Integers]] = {}
         for numbers, groups in zip(np.split(number, bounds), found.groups[kind], strict=True):
@@ -311,11 +300,11 @@ def text(
             if dimension == CELLS[kind].dimension:
                 for row in names[name].get(kind, ()):
                     inside[row].append(number)
-        order = np.argsort(_ORDERS.get(kind, range(nodes.shape[1])))
+        order = np.argsort(CELLS[kind].gmsh_nodes or range(nodes.shape[1]))
         for row, numbers in zip(nodes[:, order] + 1, inside, strict=True):
             entity = (numbers or [0])[0]
             for k, number in enumerate(numbers or [0]):
-                line = f"{_NUMBERS[kind]} 2 {number} {entity} {_joined(row)}"
+                line = f"{CELLS[kind].gmsh} 2 {number} {entity} {_joined(row)}"
                 (again if k else plain).append(line)
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
     described = [f'{d} {number} "{name}"' for (d, number), name in groups.items()]

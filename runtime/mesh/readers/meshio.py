@@ -68,10 +68,17 @@ def content_of(path: Path) -> Content:
         raise MeshError(f"{path}: {reason}") from None
 
 
+def import_meshio() -> Any:
+    """The package, which is slow to import; version 5.3.5 lacks the dimension of a cell."""
+    import meshio
+
+    meshio._mesh.topological_dimension.setdefault("wedge15", 3)
+    return meshio
+
+
 def _by_meshio(path: Path) -> Content:
     """Raises MeshError for cells that are not known, or what is wrong with the file."""
-    import meshio  # late: it is slow to import
-
+    meshio = import_meshio()
     try:
         file_mesh = meshio.read(path)
     except meshio.ReadError as error:
@@ -147,7 +154,7 @@ def _may_be_turned(path: Path, kind: str) -> bool:
     of MED; wedges of VTK, which some programs write so and others not.
     """
     solid = CELLS[kind].dimension == 3
-    return solid and (path.suffix == ".med" or (kind == "wedge6" and path.suffix in _VTK))
+    return solid and (path.suffix == ".med" or (CELLS[kind].vtk_mirrored and path.suffix in _VTK))
 
 
 def _upright(kind: str, points: Array, nodes: Integers) -> Integers:
@@ -237,7 +244,7 @@ def write(mesh: Mesh, path: Path) -> None:
 
 def _write_by_meshio(mesh: Mesh, points: Array, path: Path) -> None:
     """Names as data of cells and points of VTK; a warning where a format has none."""
-    import meshio
+    meshio = import_meshio()
 
     cells = dict(mesh.cells)
     flags: dict[str, Any] = {}
