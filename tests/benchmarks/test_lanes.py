@@ -11,6 +11,7 @@ from benchmarks import lanes
 from softehl.codegen.tools import build
 
 
+@pytest.mark.slow
 def test_two_targets_are_compared_and_timed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -56,6 +56,7 @@ def test_so_are_those_of_a_cup() -> None:
     assert max(abs(2.0 * far[name] - near[name]) for name in far) < 0.015
 
 
+@pytest.mark.slow
 def test_both_differ_by_their_curvature() -> None:
     """The difference is odd in the curvature: a quarter of the diameter makes it four times."""
     far, near = apart(LARGE), apart(0.25 * LARGE)

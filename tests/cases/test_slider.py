@@ -200,6 +200,7 @@ def test_the_flooded_parabola_ruptures_where_it_must() -> None:
     assert found[0] > 0.4
 
 
+@pytest.mark.slow
 def test_the_penalty_converges() -> None:
     """The layer in which p < 0 builds up is as long as epsilon^(-1/2)."""
     penalties, inlet = (1e2, 1e3, 1e4), -6.0

@@ -19,6 +19,7 @@ from tests.runtime.field_pages import rubber_by_log as rubber
 LENGTH = 10.0
 MASS = {"body": {"rho": 1.0}}
 ALL = ("generalised-alpha", "newmark", "midpoint", "explicit")
+SOME = [pytest.param(m, marks=[pytest.mark.slow] * (m in ALL[1:3])) for m in ALL]
 
 
 @softehl.page
@@ -148,7 +149,7 @@ def test_mass_of_a_page_is_that_of_a_density() -> None:
     np.testing.assert_allclose(modes.frequencies, same.frequencies, rtol=1e-10)
 
 
-@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize("method", SOME)
 def test_loads_and_moving_supports_do_the_work(method: str) -> None:
     """What both energies gain is the work, but for the error of the scheme."""
     study = Study(Mesh.rectangle(LENGTH, 1.0, cells=(5, 1)))
@@ -220,7 +221,7 @@ def test_pages_with_accelerations_are_not_marched_without() -> None:
         oscillator(acceleration=1.0)
 
 
-@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize("method", SOME)
 def test_tied_sides_move_as_one(method: str) -> None:
     """Both sides have one motion, and ties do no work."""
     study = Study(Mesh.rectangle(2.0, 1.0, cells=(8, 1)))

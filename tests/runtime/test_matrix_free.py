@@ -215,6 +215,7 @@ def test_negative_curvature_ends_conjugate_gradients(rng: np.random.Generator) -
     assert found.x @ b > 0.0
 
 
+@pytest.mark.slow
 def test_derivatives_need_no_factors(monkeypatch: pytest.MonkeyPatch) -> None:
     """By an adjoint and directly, at a place and of a reaction."""
 

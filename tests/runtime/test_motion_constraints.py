@@ -105,7 +105,7 @@ FEATURES: dict[str, dict[str, Any]] = {
 RESTS = [
     pytest.param(
         *(feature, scheme),
-        marks=[pytest.mark.slow] if feature != "smooth" and scheme in DEAR else [],
+        marks=[pytest.mark.slow] if feature not in ("smooth", "friction") or scheme in DEAR else [],
     )
     for feature in FEATURES
     for scheme in (*STILL, *SCHEMES)

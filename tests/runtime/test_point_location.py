@@ -11,7 +11,7 @@ from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.mesh.point_location import Located, PointLocator
 
-SHAPES = [("quad", n) for n in range(1, 7)] + [("hex", n) for n in range(1, 7)]
+SHAPES = [(shape, n) for shape in ("quad", "hex") for n in (1, 2, 3, 6)]
 SHAPES += [("serendipity", 2), ("triangle", 1), ("triangle", 2), ("tetrahedron", 1)]
 SHAPES += [("tetrahedron", 2), ("wedge", 1), ("wedge", 2), ("pyramid", 1)]
 

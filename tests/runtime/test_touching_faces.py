@@ -197,6 +197,7 @@ def fine(s: Array) -> Array:
     return 0.04 * s + 0.96 * s**3
 
 
+@pytest.mark.slow
 def test_hertz_of_a_sphere_as_a_ring() -> None:
     """a^3 = 3 P R / (4 E*), p_max = 3 P / (2 pi a^2), about the x axis."""
     E, nu, R = 1000.0, 0.3, 10.0
