@@ -82,7 +82,7 @@ def test_wedge_rule() -> None:
 
 def test_pyramid_rule() -> None:
     """x^a y^b z^c over the pyramid: 4 / ((a + 1) (b + 1)) times a beta function."""
-    exact = {}
+    exact: dict[tuple[int, ...], sp.Rational] = {}
     for a, b, c in product((0, 1, 2), (0, 2), (0, 1, 3)):
         height = sp.beta(c + 1, a + b + 3).doit()
         area = sp.Rational(4 * (a % 2 == 0), (a + 1) * (b + 1))
