@@ -39,12 +39,12 @@ PARTS = ("contact", "coarser films", "films", "files", "pictures", "else")
 @contextmanager
 def watched(clock: Clock) -> Iterator[None]:
     """The parts of all runs within it."""
-    from softehl.cases.harness.record import RunRecord
-    from softehl.cases.harness.session import Reporter
+    from softehl.cases.harness.run_record import RunRecord
+    from softehl.cases.harness.runner import Reporter
     from softehl.cases.oring import ORingCase
     from softehl.cases.seal.solve.adaptation import Adaptation
     from softehl.cases.seal.solve.contact_meshes import ContactMeshes
-    from softehl.cases.seal.solve.method import DryContact
+    from softehl.cases.seal.solve.driver import DryContact
 
     watched = [
         (ContactMeshes, "contact", lambda *_: "contact"),
@@ -111,7 +111,7 @@ def measure(name: str) -> dict[str, float]:
         begun = time.process_time()
         import softehl.cases.cli
         import softehl.cases.oring
-        import softehl.cases.seal.solve.method  # noqa: F401
+        import softehl.cases.seal.solve.driver  # noqa: F401
 
         imports = time.process_time() - begun
         if name == "default run":

@@ -22,7 +22,7 @@ import numpy as np
 from softehl.cases.cycle import CASE, Cycle
 from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import Silent
 
 ROUGHNESS = 0.3

@@ -16,7 +16,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded
 from benchmarks.clock import Clock
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.sensitivity import sensitivity
-from softehl.cases.seal.solve import method
+from softehl.cases.seal.solve import driver
 from softehl.cases.seal.states.state import Silent
 
 
@@ -28,7 +28,7 @@ def measured(p: Seal) -> tuple[float, float, int]:
         for name in ("rates_of", "sensitivities")
     }
     with patch.multiple(sensitivity, **timed):
-        states = method.run(p, Silent(), differentiate=sensitivity.differentiation(p)).states
+        states = driver.run(p, Silent(), differentiate=sensitivity.differentiation(p)).states
     clock.turn()
     return clock.seconds["solving"], clock.seconds["sensitivities"], len(states)
 

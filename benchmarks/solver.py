@@ -25,7 +25,7 @@ from typing import Any
 from benchmarks.solver_summary import FILM, difference, summary
 from softehl.cases.paper.states import PAPER
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import COLLAPSED, Silent
 from softehl.runtime.io import write_json
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from benchmarks.marked import renew
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import FilmState, Silent
 
 SEED = 33

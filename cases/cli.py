@@ -1,20 +1,22 @@
-"""`softehl run`, `sweep`, `keys`, `design` and `reproduce`.
+"""Commands of the cases: `softehl run`, `sweep`, `report`, `keys`, `design`, `reproduce` and `app`.
 
 Heavy modules are imported when a command needs them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from softehl.cases.harness.errors import BadInput
 from softehl.cases.shipped import SHIPPED
 
 if TYPE_CHECKING:
-    from softehl.cases.harness.earlier import Existing
     from softehl.cases.harness.report.part import FinishedRun, Part
+    from softehl.cases.harness.resume import Existing
 
 _NAMES = ", ".join(SHIPPED)
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -97,11 +99,11 @@ def run(
     report: bool,
 ) -> int:
     """Run a case."""
+    from softehl.cases.cli import leading
     from softehl.cases.harness.case_file import read_case
-    from softehl.cases.harness.earlier import existing_of
-    from softehl.cases.harness.engine import leading
     from softehl.cases.harness.pictures import CHOICES
-    from softehl.cases.harness.session import run_case
+    from softehl.cases.harness.resume import existing_of
+    from softehl.cases.harness.runner import run_case
 
     options = {} if tolerance is None else {"tolerance": tolerance.strip().removesuffix("%")}
     if sensitivity:
@@ -150,10 +152,9 @@ def sweep(
     sweep.csv, pictures of each result over each key, and a folder for each run, to DIR. Exit code:
     0 done, 2 bad input, 3 some runs did not converge (the others are saved).
     """
-    from softehl.cases.harness.earlier import existing_of
+    from softehl.cases.harness.resume import existing_of
     from softehl.cases.harness.study_file import read_study
-    from softehl.cases.harness.sweep_command import Workers, sweep_study
-    from softehl.cases.harness.sweep_record import SweepRecord
+    from softehl.cases.harness.sweep import SweepRecord, Workers, sweep_study
 
     read = read_study(study, SHIPPED, assignments)
     existing = existing_of(resume=resume, overwrite=overwrite)
@@ -196,10 +197,9 @@ def report_runs(
 
 def _hand_over(folders: tuple[Path, ...], target: Path) -> int:
     """Write what a simulation of a system needs of the runs, or of a sweep over pressures."""
-    from softehl.cases.harness.errors import BadInput
     from softehl.cases.harness.report.page import read_finished
     from softehl.cases.harness.report.sweep_page import is_sweep, read_sweep
-    from softehl.cases.seal.report.hand_over import write_hand_over
+    from softehl.cases.seal.report.system_export import write_hand_over
 
     runs = []
     for folder in folders:
@@ -219,7 +219,7 @@ def _hand_over(folders: tuple[Path, ...], target: Path) -> int:
 
 def _unnamed(name: str, existing: "Existing") -> Path:
     """The folder of results for a run of this name; which, is said where it is not the first."""
-    from softehl.cases.harness.folders import unnamed_folder
+    from softehl.cases.harness.output_dir import unnamed_folder
 
     folder, word = unnamed_folder(Path("results", name), existing)
     if word:
@@ -229,8 +229,6 @@ def _unnamed(name: str, existing: "Existing") -> Path:
 
 def _report_of(folder: Path, code: int, *, quiet: bool) -> int:
     """Report a run that is done; its exit code, or 2 where there is nothing that says so yet."""
-    from softehl.cases.harness.errors import BadInput
-
     try:
         _write_report((folder,), folder / "report.html", xlsx=False, quiet=quiet)
     except BadInput as error:
@@ -255,8 +253,6 @@ def _write_report(folders: tuple[Path, ...], path: Path, *, xlsx: bool, quiet: b
 
 
 def _require_page(path: Path, option: str) -> None:
-    from softehl.cases.harness.errors import BadInput
-
     if path.suffix not in (".html", ".htm"):
         raise BadInput(f'{option} {str(path)!r}: a report is a page; allowed: a name with ".html"')
 
@@ -271,7 +267,6 @@ def _write(
     quiet: bool,
 ) -> None:
     """Write a page and its tables, and say so.  Raises BadInput."""
-    from softehl.cases.harness.errors import BadInput
     from softehl.cases.harness.report.page import write_page, write_xlsx
 
     try:
@@ -286,10 +281,34 @@ def _write(
         click.echo(f"written to {path} ({told})")
 
 
+@contextmanager
+def leading(engine: str, jobs: int) -> Iterator[bool]:
+    """Yield True in the process that runs the case; the others have done their part by then.
+
+    engine: "serial" or "petsc".  Raises BadInput where PETSc is missing, or for jobs beside it.
+    """
+    if engine == "serial":
+        yield True
+        return
+    from softehl.runtime.mpi import MissingPetsc
+    from softehl.runtime.solve.linear import mumps
+
+    if jobs > 1:
+        raise BadInput(
+            f"--jobs {jobs} with --engine petsc: allowed is 1; the processes of mpirun work "
+            "together, start more of them"
+        )
+    try:
+        mumps.require()
+    except MissingPetsc as error:
+        raise BadInput(f"--engine {error}") from None
+    with mumps.leading() as leads:
+        yield leads
+
+
 def _by_petsc(case: str) -> str:
     """Settings of a case by which PETSc solves its linear systems.  Raises BadInput."""
     from softehl.cases.harness.case_file import find_case
-    from softehl.cases.harness.errors import BadInput
 
     found = find_case(case, SHIPPED)[0]
     if "linear" not in found.parameters.model_fields:
@@ -343,11 +362,10 @@ def design(
 ) -> int:
     """Find the value of a key."""
     from softehl.cases.harness.case_file import read_case
-    from softehl.cases.harness.errors import BadInput
     from softehl.cases.harness.progress import make_display
-    from softehl.cases.harness.session import Teller
+    from softehl.cases.harness.runner import Teller
     from softehl.cases.seal.gland.parameters import Seal
-    from softehl.cases.seal.sensitivity.design_command import design_case, told
+    from softehl.cases.seal.sensitivity.design import design_case, told
     from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 
     read = read_case(case, SHIPPED, assignments)
@@ -398,8 +416,42 @@ def reproduce(
     runs in DIR/runs. States whose verdict is not ok are marked and named in the caption. Exit
     code: 0 done, 2 bad input.
     """
-    from softehl.cases.paper.command import reproduce_items
-    from softehl.cases.paper.item import Scope
+    from softehl.cases.paper.figure_spec import Scope
+    from softehl.cases.paper.reproduce import reproduce_items
 
     scope = Scope(density=int(density) if density else None)
     return reproduce_items(items, scope, folder, resume=resume, jobs=jobs)
+
+
+_MISSING = "softehl app needs Panel: pip install 'softehl[app]'"
+
+
+@click.command()
+@click.option(
+    "--folder",
+    metavar="DIR",
+    default="results",
+    show_default=True,
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder of the runs; the app also shows runs that it already has.",
+)
+@click.option(
+    "--port",
+    metavar="N",
+    default=0,
+    type=click.IntRange(0, 65535),
+    help="Port of the address  [default: a free one]",
+)
+@click.option("--no-browser", is_flag=True, help="Print the address, open no browser.")
+def app(folder: Path, port: int, no_browser: bool) -> int:
+    """Choose a seal, run it and compare runs, in a browser on this machine.
+
+    Prints the address with its token; the server refuses requests without it. Ctrl-C ends the
+    app and the runs that it started; their computed states are saved.
+    """
+    try:
+        from softehl.cases.app.server import serve
+    except ImportError as error:
+        raise BadInput(f"{_MISSING} ({error})") from None
+    serve(folder, port, show=not no_browser)
+    return 0

@@ -17,11 +17,11 @@ from softehl.cases.harness.pictures import KINDS, draw_columns, save
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.seal.cycle.motion import Motion, motion_keys
+from softehl.cases.seal.gland.messages import assumed, foreword, warnings
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import MIXED
-from softehl.cases.seal.gland.told import assumed, foreword, warnings
-from softehl.cases.seal.report.words import LEFT_OUT, cautions, titled
-from softehl.cases.seal.states.answer import far, leaks
+from softehl.cases.seal.report.model_limits import LEFT_OUT, cautions, titled
+from softehl.cases.seal.states.summary import far, leaks
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
 
@@ -177,7 +177,7 @@ class CycleRow(Row):
 
 
 def cycle_row(number: int, radius: float, films: Any, before: Any, last: Any) -> CycleRow:
-    """A cycle in numbers; films: what happened in it, see `cases.seal.cycle.cycles.Films`.
+    """A cycle in numbers; films: what happened in it, see `cases.seal.cycle.cycle_driver.Films`.
 
     before: the reading at its start, last: the row before it or None.
     """
@@ -305,7 +305,7 @@ class CycleCase(Case[Cycle, CycleRow]):
 
     def solve(self, parameters: Cycle, observer: Observer, shared: Path | None) -> Outcome:
         """See :class:`Case`."""
-        from softehl.cases.seal.cycle.cycles import run_cycles
+        from softehl.cases.seal.cycle.cycle_driver import run_cycles
 
         def log(number: int, films: Any, before: Any, last: Any) -> CycleRow:
             row = cycle_row(number, 0.5 * abs(parameters.rod_diameter), films, before, last)

@@ -16,8 +16,8 @@ from softehl.cases.harness.case import load_case
 from softehl.cases.harness.parameters import declared, keys_of
 from softehl.cases.harness.row import Record
 from softehl.cases.harness.table import column_lines, key_lines
-from softehl.cases.seal.gland.sections import SECTIONS
-from softehl.cases.seal.gland.sections.keys import dimensions
+from softehl.cases.seal.gland.sections.section_keys import dimensions
+from softehl.cases.seal.gland.sections.shapes import SECTIONS
 from softehl.cases.seal.gland.tolerances import ToleranceRow
 from softehl.cases.seal.states.leakage import LeakageRow
 from softehl.cases.shipped import SHIPPED

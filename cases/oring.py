@@ -9,18 +9,18 @@ from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.pictures import KINDS
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Record
+from softehl.cases.seal.gland.messages import assumed, foreword, warnings
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.told import assumed, foreword, warnings
 from softehl.cases.seal.report import paraview, tables
-from softehl.cases.seal.report.words import LEFT_OUT, cautions, titled
-from softehl.cases.seal.states import plan
-from softehl.cases.seal.states.answer import answer
+from softehl.cases.seal.report.model_limits import LEFT_OUT, cautions, titled
+from softehl.cases.seal.states import run_plan
 from softehl.cases.seal.states.leakage import net_leakage
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.sensitivity_table import differentiable, resolved
 from softehl.cases.seal.states.state import FilmRow
 from softehl.cases.seal.states.state import Observer as SealObserver
 from softehl.cases.seal.states.state import Outcome as SealOutcome
+from softehl.cases.seal.states.summary import answer
 
 PICTURES = ("curve", "profiles", "section")
 """Names of the files, each .png or .svg or both, of every run."""
@@ -53,15 +53,15 @@ class ORingCase(Case[Seal, FilmRow]):
 
     def requested(self, parameters: Seal) -> list[float]:
         """See :class:`Case`."""
-        return plan.rod_speeds(parameters)
+        return run_plan.rod_speeds(parameters)
 
     def rounds(self, parameters: Seal) -> Sequence[Seal]:
         """See :class:`Case`."""
-        return plan.refinements(parameters)
+        return run_plan.refinements(parameters)
 
     def pieces(self, parameters: Seal, rows: Sequence[FilmRow], jobs: int) -> list[Seal]:
         """See :class:`Case`."""
-        return plan.pieces(parameters, rows, jobs)
+        return run_plan.pieces(parameters, rows, jobs)
 
     def piece_name(self, piece: Seal) -> str:
         """See :class:`Case`."""
@@ -80,7 +80,7 @@ class ORingCase(Case[Seal, FilmRow]):
     ) -> list[str]:
         """See :class:`Case`."""
         collapsed = super().complaints(parameters, rows, rejected, advice)
-        outside = plan.outside_tolerance(parameters, rows)
+        outside = run_plan.outside_tolerance(parameters, rows)
         words = [f"collapsed film, {complaint}" for complaint in collapsed]
         if outside:
             words.append(f"h* not known to {parameters.tolerance:g} %: {self.named(outside)}")
@@ -132,12 +132,14 @@ class ORingCase(Case[Seal, FilmRow]):
         self, rows: Sequence[FilmRow], advice: Mapping[float, str] = MappingProxyType({})
     ) -> list[str]:
         """See :class:`Case`."""
-        found = plan.doubts(rows, advice)
+        found = run_plan.doubts(rows, advice)
         doubts = [f"{words}: {self.named(some)}" for words, some in found.items()]
-        thin = [row for row in rows if not row.regime and row.h_min_um < plan.THIN]
+        thin = [row for row in rows if not row.regime and row.h_min_um < run_plan.THIN]
         if not thin:
             return doubts
-        words = f"films below {plan.THIN:g} um, where surfaces of {plan.USUAL:g} um rms touch"
+        words = (
+            f"films below {run_plan.THIN:g} um, where surfaces of {run_plan.USUAL:g} um rms touch"
+        )
         return [*doubts, f"smooth surfaces: {words}: {self.named(thin)}; give their roughness"]
 
     def cautions(self, parameters: Seal) -> list[str]:
@@ -195,7 +197,7 @@ def run_oring(
         States, their cost, and the reason of the end.
     """
     from softehl.cases.seal.sensitivity.sensitivity import differentiation
-    from softehl.cases.seal.solve.method import run
+    from softehl.cases.seal.solve.driver import run
 
     return run(parameters, observer, contacts, differentiation(parameters))
 

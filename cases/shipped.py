@@ -78,7 +78,7 @@ def solve_cases(
         cancelled; those that have are saved.
     """
     from softehl.cases.harness import sweep
-    from softehl.cases.harness.earlier import existing_of
+    from softehl.cases.harness.resume import existing_of
 
     existing = existing_of(resume=resume, overwrite=overwrite)
     return sweep.solve_all(sweep.named(cases, case_of), Path(folder), executor, existing)

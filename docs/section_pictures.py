@@ -17,13 +17,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from softehl.cases.seal.gland.sections import SECTIONS
-from softehl.cases.seal.gland.sections.d_ring import DRing
-from softehl.cases.seal.gland.sections.keys import capped
-from softehl.cases.seal.gland.sections.rectangular import Rectangular
-from softehl.cases.seal.gland.sections.trapezoid import Trapezoid
-from softehl.cases.seal.gland.sections.u_cup import UCup
-from softehl.cases.seal.gland.sections.x_ring import XRing
+from softehl.cases.seal.gland.sections.section_keys import capped
+from softehl.cases.seal.gland.sections.shapes import (
+    SECTIONS,
+    DRing,
+    Rectangular,
+    Trapezoid,
+    UCup,
+    XRing,
+)
 from softehl.cases.seal.meshing.outline import Point, Shape
 from softehl.cases.seal.meshing.outline_mesh import outline_mesh
 

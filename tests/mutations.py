@@ -475,7 +475,7 @@ FAULTS = (
         "tests/cases/test_materials.py",
     ),
     Fault(
-        "cases/seal/gland/fitting.py",
+        "cases/seal/gland/fit_geometry.py",
         "section * (1.0 - values",
         "section * (1.0 + values",
         "tests/cases/test_fitting.py tests/cases/test_catalogue.py",

@@ -116,7 +116,7 @@ def test_rooms_import_only_what_they_may(room: str) -> None:
         ("runtime", "import importlib\nimportlib.import_module('softehl.codegen.pipeline')"),
         ("cases", "def f():\n    import_module(f'softehl.codegen.{name}')"),
         ("runtime", "from softehl.codegen.graph.graph import Graph"),
-        ("runtime", "import softehl.cases.seal.solve.method"),
+        ("runtime", "import softehl.cases.seal.solve.driver"),
         ("codegen", "from softehl.runtime.discretisation.quadrature import gauss"),
     ],
 )
@@ -149,13 +149,13 @@ def test_every_folder_has_its_place(room: str) -> None:
         ("codegen", "emit/simd.py", "from softehl.codegen import pipeline"),
         ("runtime", "mesh/mesh.py", "def f():\n    import softehl.runtime.discretisation.dofmap"),
         ("runtime", "solve/newton.py", "from softehl.runtime.discretisation import dofmap"),
-        ("cases", "harness/record.py", "from softehl.cases.seal.states.state import FilmRow"),
-        ("cases", "seal/solve/method.py", "from softehl.cases import oring"),
+        ("cases", "harness/run_record.py", "from softehl.cases.seal.states.state import FilmRow"),
+        ("cases", "seal/solve/driver.py", "from softehl.cases import oring"),
         ("cases", "paper/states.py", "import softehl.cases.cli"),
         ("cases/seal", "gland/oils.py", "from softehl.cases.seal.section import layout"),
-        ("cases/seal", "gland/sections/keys.py", "import softehl.cases.seal.states.state"),
+        ("cases/seal", "gland/sections/section_keys.py", "import softehl.cases.seal.states.state"),
         ("cases/seal", "states/verdict.py", "from softehl.cases.seal import solve"),
-        ("cases/seal", "solve/films.py", "def f():\n    from softehl.cases.seal import cycle"),
+        ("cases/seal", "solve/driver.py", "def f():\n    from softehl.cases.seal import cycle"),
     ],
 )
 def test_an_import_out_of_order_is_seen(room: str, path: str, source: str) -> None:

@@ -1,26 +1,251 @@
-"""The page of the desk: a form, the gland that follows, runs with their curves, what to do."""
+"""Page of the desk: a form, the gland that follows, runs with their curves.
+
+The form has a list for each key, in terms of the trade; other texts may be typed.
+"""
 
 from __future__ import annotations
 
 import html
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from io import StringIO
+from math import ceil
 from typing import Any
 from urllib.parse import urlencode
 
 import pandas as pd
 import panel as pn
+import panel_material_ui as pmui
+from panel.util import edit_readonly
 
-from softehl.cases.app.form import Form
-from softehl.cases.app.runs import Desk, RunState
-from softehl.cases.harness.case import Alarm, Run
-from softehl.cases.harness.earlier import advice_of
+from softehl.cases.app.runs import CASE, Desk, RunState
+from softehl.cases.harness.case import Alarm, Run, load_case
+from softehl.cases.harness.case_file import read_assignment, validated
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.report.part import FinishedRun
+from softehl.cases.harness.resume import advice_of
+from softehl.cases.seal.gland.catalogue import as568
+from softehl.cases.seal.gland.trade.normalise_text import NotUnderstoodError, number_text
+from softehl.cases.seal.gland.trade.ring_names import read_ring
+from softehl.cases.seal.gland.trade.rubber_names import RANGES
 from softehl.cases.seal.report import style
-from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
-from softehl.cases.seal.report.interactive import curve_plot, friction_plot
+from softehl.cases.seal.report.bokeh_plots import curve_plot, friction_plot
+from softehl.cases.seal.report.gland_drawing import fit_numbers, gland_figure
+from softehl.cases.shipped import SHIPPED
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A key of a case: what it is called on the desk, what it begins with, what is offered."""
+
+    key: str
+    label: str
+    value: str
+    options: Sequence[str]
+
+
+SPEEDS = (10, 20, 50, 100, 200, 400, 800, 1600)
+"""Rod speeds that are offered, mm/s."""
+
+USUAL_SPEEDS = (100, 400)
+"""Choices that a new desk begins with."""
+
+DENSITIES = {"coarse, seconds": 1, "usual": 2, "fine": 4, "very fine, minutes": 8}
+"""Meshes in words -> the key `density`."""
+
+_SIZES = (
+    *("6x2", "8x2", "10x2", "12x2", "16x2", "20x2.65", "25x2.65", "28x3.55", "32x3.55"),
+    *("36x3.55", "36x4", "40x4", "45x4", "50x5.3", "56x5.3", "63x5.3", "80x5.3", "100x7"),
+)
+_SMALL, _LARGE = 2.5, 500.0  # mm: those that have a gland and a fit
+_RINGS = (
+    *(f"ISO 3601 {size}" for size in _SIZES),
+    *("X-ring 36x4", "X-ring AS568-210", "X-ring AS568-226"),
+    *("U-cup 20x30x8", "U-cup 25x35x8", "U-cup 36x46x8", "U-cup 50x65x12"),
+    *(ring.name for ring in as568().values() if _SMALL < ring.inner_diameter < _LARGE),
+)
+_HARDNESSES = {"FKM": (75, 80, 90), "EPDM": (70, 80), "PU": (90, 95)}
+_RUBBERS = tuple(f"{p} {s}" for p in RANGES for s in _HARDNESSES.get(p, (70, 80, 90)))
+_OILS = (
+    *(f"HLP {grade}" for grade in (10, 15, 22, 32, 46, 68, 100)),
+    *(f"HVLP {grade}" for grade in (15, 22, 32, 46, 68)),
+    *(f"ISO VG {grade}" for grade in (10, 15, 22, 32, 46, 68, 100, 150, 220)),
+    *("46 cSt at 40 degC, 6.8 cSt at 100 degC", "10 mPas", "100 mPas"),
+)
+
+CHOICES = (
+    Choice("ring", "Seal", "ISO 3601 36x4", _RINGS),
+    Choice("rod", "Rod, or bore of a piston", "36 f7", ()),
+    Choice("compound", "Rubber", "NBR 70", _RUBBERS),
+    Choice("oil", "Oil", "HLP 46", _OILS),
+    Choice("temperature", "Temperature", "40 degC", [f"{t} degC" for t in range(20, 101, 10)]),
+    Choice(
+        *("sealed_pressure", "Sealed pressure", "10 bar"),
+        [f"{p} bar" for p in (1, 2, 6, 10, 16, 25, 40, 63, 100, 160)],
+    ),
+    Choice(
+        *("roughness", "Surface of the seal", "smooth"),
+        ["smooth", *(f"Ra {height}" for height in (0.1, 0.2, 0.4, 0.8))],
+    ),
+    Choice("gland", "Gland", "hydraulic", ["hydraulic", "pneumatic"]),
+)
+"""All that is chosen by one text, in the order of the desk."""
+
+
+BORE = "bore "
+"""What the size of a bore begins with."""
+
+
+def slides_on(text: str) -> tuple[str, str]:
+    """The key and its value that a rod, or a bore, is in a case."""
+    bore = text.lower().startswith(BORE)
+    return ("bore", text[len(BORE) :].strip()) if bore else ("rod", text)
+
+
+def rods(ring: str) -> list[str]:
+    """Rods that a ring goes with, the usual one first, and the bore that it just fits into; none
+    where the ring is not understood.
+    """
+    try:
+        said = read_ring(ring)
+    except NotUnderstoodError:
+        return []
+    if said.number is None:
+        sizes: tuple[float, float] = (said.inner, ceil(1.02 * said.inner))
+        bore = said.outer or said.inner + 2.0 * said.section
+    elif said.number in as568():
+        inner = as568()[said.number].inner_diameter
+        sizes = (ceil(inner), round(1.02 * inner, 1))
+        bore = round(as568()[said.number].outer_diameter, 1)
+    else:
+        return []
+    shown = dict.fromkeys(map(number_text, sizes))
+    found = [f"{size}{fit}" for size in shown for fit in _FITS]
+    return [*found, *(f"{BORE}{number_text(bore)}{fit}" for fit in _HOLES)]
+
+
+_HOLES = (" H8", " H9", "")
+_FITS = (" f7", " f8", " h8", " h9", " e8", "")
+
+
+_HERE = "desk"
+_TEXTS = frozenset(choice.key for choice in CHOICES)
+"""Keys whose fields take any text."""
+
+_BY_GROOVE = "u-cup"
+"""A ring that is named by its groove, which has no other gland."""
+
+
+class Form:
+    """Widgets by key, and the keys of a case that follow from them."""
+
+    def __init__(self) -> None:
+        self.widgets: dict[str, Any] = {
+            choice.key: pmui.AutocompleteInput(
+                name=choice.label,
+                value=choice.value,
+                options=list(choice.options) or rods(CHOICES[0].value),
+                restrict=False,
+                case_sensitive=False,
+                min_characters=0,
+                search_strategy="includes",
+                size="small",
+                sizing_mode="stretch_width",
+            )
+            for choice in CHOICES
+        }
+        self.widgets["speeds"] = pn.widgets.MultiChoice(
+            name="Rod speeds [mm/s]",
+            value=list(USUAL_SPEEDS),
+            options=list(SPEEDS),
+            sizing_mode="stretch_width",
+        )
+        self.widgets["density"] = pn.widgets.Select(
+            name="Mesh", value=DENSITIES["usual"], options=DENSITIES, sizing_mode="stretch_width"
+        )
+        self.widgets["more"] = pn.widgets.TextAreaInput(
+            name="Other keys, KEY = VALUE in each line",
+            placeholder="stroke = out",
+            sizing_mode="stretch_width",
+        )
+        for shown in ("value", "value_input"):
+            self.widgets["ring"].param.watch(self._offer_rods, shown)
+
+    def watch(self, told: Callable[[Any], None]) -> None:
+        """Call a function whenever a value changes, or what is typed in a field."""
+        for key, widget in self.widgets.items():
+            if key in _TEXTS:
+                widget.param.watch(lambda event: _show_text(event.obj), "value")
+                widget.param.watch(told, "value_input")
+            widget.param.watch(told, "value")
+
+    def settle(self) -> None:
+        """Take over what was typed and not entered: the form is what its fields show."""
+        for key in _TEXTS:
+            widget = self.widgets[key]
+            typed = widget.value_input
+            if typed and widget.value != typed:
+                _take(widget, typed, widget.options)
+
+    def keep_in(self, address: Any) -> None:
+        """Keep all values in the address of the page, so that they are there after a reload."""
+        for key, widget in self.widgets.items():
+            if key in _TEXTS and (text := address.query_params.get(key)):
+                _take(widget, str(text), widget.options)
+            address.sync(widget, {"value": key})
+
+    def values(self) -> dict[str, Any]:
+        """The keys of the case.  Raises BadInput for another key that cannot be read."""
+        found: dict[str, Any] = {}
+        for key, widget in self.widgets.items():
+            value = widget.value_input or widget.value if key in _TEXTS else widget.value
+            value = value.strip() if isinstance(value, str) else value
+            if key != "more" and value and value != "smooth":
+                found[key] = value
+        if str(found.get("ring", "")).lower().startswith(_BY_GROOVE):
+            found.pop("gland", None)
+        if isinstance(rod := found.pop("rod", None), str):
+            key, value = slides_on(rod)
+            found[key] = value
+        for line in (self.widgets["more"].value or "").splitlines():
+            if line.strip():
+                key, value = read_assignment(line, _HERE)
+                found[key] = value
+        return found
+
+    def run(self) -> tuple[Run, Mapping[str, Any]]:
+        """The run that is chosen, and its keys.  Raises BadInput, in words for the page."""
+        values = self.values()
+        case = load_case(SHIPPED[CASE])
+        try:
+            checked = validated(case.parameters, values, dict.fromkeys(values, _HERE))
+        except BadInput as error:
+            raise BadInput(error.message.removeprefix(f"{_HERE}: ")) from None
+        return Run(case, checked, given=frozenset(values)), values
+
+    def _offer_rods(self, event: Any) -> None:
+        """Offer the rods that a new ring goes with, and take the usual one."""
+        offered = rods(event.new or "")
+        if offered:
+            rod = self.widgets["rod"]
+            _take(rod, rod.value if rod.value in offered else offered[0], offered)
+
+
+def _take(widget: Any, text: str, offered: Sequence[str]) -> None:
+    """Give a field its text and what it offers, in one change: it drops a value that is not among
+    its options, also one that was refused, as soon as these change.
+    """
+    options = list(offered) if text in offered else [*offered, text]
+    widget.param.update(options=options, value=text)
+
+
+def _show_text(widget: Any) -> None:
+    """Write the value of a field into it: the widget empties itself where that is not listed."""
+    if widget.value and widget.value_input != widget.value:
+        with edit_readonly(widget):
+            widget.value_input = widget.value
+
 
 PERIOD = 500
 """Milliseconds between two looks at the runs."""
@@ -122,7 +347,7 @@ class Page:
         self.form.settle()
         self.drawing.object = _drawing(run)
         warned = bool(run.case.warnings(run.parameters))
-        self.words.param.update(object=_told(run), alert_type="warning" if warned else "light")
+        self.words.param.update(object=_messages(run), alert_type="warning" if warned else "light")
         self.begin.disabled = False
 
     def _start(self) -> None:
@@ -242,7 +467,7 @@ def _drawing(run: Run) -> str:
     return re.sub(r' (width|height)="[\d.]+pt"', "", text, count=2)  # as wide as the page has room
 
 
-def _told(run: Run) -> str:
+def _messages(run: Run) -> str:
     """Fit, warnings and what is assumed of a run, as the command line has them."""
     case, p = run.case, run.parameters
     fits = [f"{name} {value:.4g} {unit}" for name, (value, unit) in fit_numbers(p).items()]

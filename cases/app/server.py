@@ -26,7 +26,7 @@ from tornado.websocket import WebSocketClosedError
 from softehl.cases.app.page import Page
 from softehl.cases.app.runs import Desk
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.process import Ended
+from softehl.cases.harness.signals import Ended
 
 HOST = "127.0.0.1"
 _PAGE, _LOGIN = "/desk", "/refused"

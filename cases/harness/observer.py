@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypedDict, Unpack
 
-from softehl.cases.harness.files import Content
+from softehl.cases.harness.file_content import Content
 from softehl.cases.harness.row import Row
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.solution import Status

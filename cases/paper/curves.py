@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper import drawing
 from softehl.cases.paper.drawing import Line
-from softehl.cases.paper.item import Item, Product, Scope, density_words, doubts, state_table
+from softehl.cases.paper.figure_spec import Item, Product, Scope, density_words, doubts, state_table
 from softehl.cases.paper.states import Request, Store, ask, setup
-from softehl.cases.seal.gland.records.discretisation import DENSITIES
+from softehl.cases.seal.gland.records import DENSITIES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softehl.cases.paper.item import Product
+from softehl.cases.paper.figure_spec import Product
 from softehl.cases.paper.states import State
 from softehl.cases.seal.states.state import Profile
 from softehl.runtime.io import replacing

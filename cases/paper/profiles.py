@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper import drawing
-from softehl.cases.paper.item import (
+from softehl.cases.paper.figure_spec import (
     Item,
     Product,
     Scope,
@@ -18,7 +18,7 @@ from softehl.cases.paper.item import (
     state_table,
 )
 from softehl.cases.paper.states import Request, State, Store, ask, setup
-from softehl.cases.seal.gland.records.discretisation import DENSITIES
+from softehl.cases.seal.gland.records import DENSITIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

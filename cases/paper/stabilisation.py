@@ -6,7 +6,7 @@ from math import isnan, nan
 from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper import drawing
-from softehl.cases.paper.item import Item, Product, Scope, Table, both
+from softehl.cases.paper.figure_spec import Item, Product, Scope, Table, both
 from softehl.cases.paper.states import STABILISED, Request, State, Store, ask, setup
 from softehl.runtime.io import Cell
 

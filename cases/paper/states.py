@@ -10,13 +10,13 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-from softehl.cases.harness.curve import CurveFolder
+from softehl.cases.harness.curve_folder import CurveFolder
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.sweep import differences
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.observer_adapter import read_profile
-from softehl.cases.seal.states.plan import SIGNS
+from softehl.cases.seal.states.run_plan import SIGNS
 from softehl.cases.seal.states.state import COLLAPSED, FilmRow, Profile
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import number_text, read_columns, read_json

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softehl.cases.paper.item import Item, Product, Scope, Table, density_words
+from softehl.cases.paper.figure_spec import Item, Product, Scope, Table, density_words
 from softehl.cases.paper.states import SPEEDS, Request, Store, ask, setup
-from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.discretisation import DENSITIES
+from softehl.cases.seal.gland.records import DENSITIES
 from softehl.runtime.io import number_text
 
 if TYPE_CHECKING:

@@ -4,13 +4,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from softehl.cases.harness.independent_rows import RowByRow
 from softehl.cases.harness.observer import State
 from softehl.cases.harness.row import OK, Row, column
-from softehl.cases.harness.row_by_row import RowByRow
-from softehl.cases.seal.equations.system import PRESSURE
-from softehl.cases.slider.film import conserving_solution, penalty_solution, strip_of
+from softehl.cases.seal.equations.definition import PRESSURE
+from softehl.cases.slider.film import (
+    beyond_front,
+    conserving_solution,
+    fronts,
+    penalty_solution,
+    strip_of,
+)
 from softehl.cases.slider.parameters import Slider
-from softehl.cases.slider.strip import beyond_front, fronts
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.postprocessing import element_means, interval_below
 from softehl.runtime.discretisation.problem import Problem

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from softehl.__main__ import main
     from softehl.cases.harness.errors import BadInput
     from softehl.cases.harness.parameters import Parameters
-    from softehl.cases.harness.processes import processes
+    from softehl.cases.harness.process_pool import processes
     from softehl.cases.harness.sweep import Curve
     from softehl.cases.oring import run_oring
     from softehl.cases.seal.gland.parameters import ORing, Seal
@@ -168,7 +168,7 @@ _PUBLIC = {
     "System": "softehl.runtime.equations.system",
     "UnstableState": "softehl.runtime.equations.stability",
     "main": "softehl.__main__",
-    "processes": "softehl.cases.harness.processes",
+    "processes": "softehl.cases.harness.process_pool",
     "run_oring": "softehl.cases.oring",
     "solve_cases": "softehl.cases.shipped",
 }

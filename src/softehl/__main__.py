@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softehl import SymPyNeededError, __version__, with_sympy
-from softehl.cases.harness.process import Ended, readers_that_leave, signals
+from softehl.cases.harness.signals import Ended, readers_that_leave, signals
 
 if TYPE_CHECKING:
     import click
@@ -97,8 +97,7 @@ def _allowed(error: "click.UsageError", context: "click.Context", command: "clic
 def _commands() -> "click.Group":
     import click
 
-    from softehl.cases.app.command import app
-    from softehl.cases.cli import design, keys, report_runs, reproduce, run, sweep
+    from softehl.cases.cli import app, design, keys, report_runs, reproduce, run, sweep
     from softehl.codegen.hosts.registry import targets
 
     @click.group(no_args_is_help=False)

@@ -4,7 +4,7 @@ import os
 import time
 from pathlib import Path
 
-from softehl.cases.harness.processes import processes
+from softehl.cases.harness.process_pool import processes
 
 
 def double(value: int) -> int:

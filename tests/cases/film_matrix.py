@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 import softehl
-from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.sections.shapes import SECTIONS
 
 SEED = 16
 LIMIT = 60  # seconds

@@ -22,7 +22,7 @@ import numpy as np
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.catalogue import as568
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import FilmState, Silent
 
 SEED = 13

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.sections.shapes import SECTIONS
 from tests.cases.gland_matrix import SPEEDS, main
 
 SEED = 17

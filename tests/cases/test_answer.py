@@ -19,8 +19,8 @@ from softehl.cases.harness.row import OK
 from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.parts import tolerances
-from softehl.cases.seal.states.answer import RETURNS, answer
 from softehl.cases.seal.states.state import UNCERTAIN, FilmRow
+from softehl.cases.seal.states.summary import RETURNS, answer
 from tests.cases.test_leakage import row
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from softehl.__main__ import main
-from softehl.cases.app.choices import CHOICES, rods, slides_on
+from softehl.cases.app.page import CHOICES, rods, slides_on
 from softehl.cases.app.runs import Desk, case_text
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.seal.gland.parameters import Seal

@@ -6,9 +6,9 @@ import pytest
 
 from softehl.cases.seal.gland.catalogue import as568, ring
 from softehl.cases.seal.gland.grooves import INCH, squeeze
-from softehl.cases.seal.gland.records.gland import Gland
-from softehl.cases.seal.gland.told import handbook
-from softehl.cases.seal.gland.trade.text import NotUnderstoodError
+from softehl.cases.seal.gland.messages import handbook
+from softehl.cases.seal.gland.records import Gland
+from softehl.cases.seal.gland.trade.normalise_text import NotUnderstoodError
 
 SERIES = {0: (1, 50), 1: (102, 178), 2: (201, 284), 3: (309, 395), 4: (425, 475)}
 # inside diameter and tolerance, inch, as makers' charts print them

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.contact_stages import contact_problem
+from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.solve.solution import Point, Solution, Status
 

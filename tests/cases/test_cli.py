@@ -18,10 +18,10 @@ import pytest
 import softehl
 from softehl.cases import oring
 from softehl.cases.harness import observer as harness
-from softehl.cases.harness.earlier import kernel_signatures
-from softehl.cases.harness.record import RunRecord
+from softehl.cases.harness.resume import kernel_signatures
 from softehl.cases.harness.row import OK
-from softehl.cases.harness.session import NOT_CONVERGED
+from softehl.cases.harness.run_record import RunRecord
+from softehl.cases.harness.runner import NOT_CONVERGED
 from softehl.cases.oring import PICTURES, ORingCase
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report import pictures

@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.sections import SECTIONS
-from softehl.cases.seal.gland.sections.keys import dimensions
-from softehl.cases.seal.solve.contact import contact_problem
+from softehl.cases.seal.gland.sections.section_keys import dimensions
+from softehl.cases.seal.gland.sections.shapes import SECTIONS
 from softehl.cases.seal.solve.contact_meshes import (
     WITHOUT_INFLUENCE,
     ContactStore,
     contact_key,
     stored_contact,
 )
-from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.contact_stages import contact_problem
+from softehl.cases.seal.solve.driver import run
+from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.states.state import Outcome, Silent
 from softehl.runtime.io import read_arrays, write_arrays
 

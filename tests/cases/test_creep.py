@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.contact import approach_stage, at_air_wall, contact_problem
-from softehl.cases.seal.solve.contact_relaxation import CreepCorrector, Creeping
-from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.contact_solver import ContactSolver, CreepCorrector, Creeping
+from softehl.cases.seal.solve.contact_stages import approach_stage, at_air_wall, contact_problem
+from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton

@@ -13,15 +13,15 @@ import pytest
 
 import softehl
 from softehl.cases.cycle import CASE, Cycle, cycle_row
-from softehl.cases.seal.cycle import cycles
-from softehl.cases.seal.cycle.cycles import Films
+from softehl.cases.seal.cycle import cycle_driver
+from softehl.cases.seal.cycle.cycle_driver import Films
 from softehl.cases.seal.cycle.motion import Motion, RodFilm, Table
 from softehl.cases.seal.cycle.transient import Reading
-from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE, VOID
+from softehl.cases.seal.equations.definition import FILM, PRESSURE, SQUEEZE, VOID
 from softehl.cases.seal.report.cycle import (
     loop_figure,
 )
-from softehl.cases.slider.strip import Oil, Strip
+from softehl.cases.slider.film import Oil, Strip
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation import quadrature
 from softehl.runtime.discretisation.problem import Problem
@@ -246,7 +246,7 @@ def test_a_run_that_goes_on_does_the_same_to_the_last_bit(
     begun = (parts / "loop_1.csv").stat().st_mtime_ns
     resume = ["run", "cycle", *keys, "--out", str(parts), "--resume", "--quiet"]
     steps, drafts = [0], parts / "unfinished.npz"
-    film_of = cycles._film
+    film_of = cycle_driver._film
 
     def ended(*given: Any) -> dict[str, Array]:
         steps[0] += 1
@@ -255,8 +255,8 @@ def test_a_run_that_goes_on_does_the_same_to_the_last_bit(
         return film_of(*given)
 
     with monkeypatch.context() as patched:
-        patched.setattr(cycles, "BETWEEN_DRAFTS", 0.0)
-        patched.setattr(cycles, "_film", ended)
+        patched.setattr(cycle_driver, "BETWEEN_DRAFTS", 0.0)
+        patched.setattr(cycle_driver, "_film", ended)
         assert softehl.main(resume) == 130
     held = read_arrays(drafts)
     assert held is not None

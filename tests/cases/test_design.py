@@ -11,10 +11,11 @@ import pytest
 
 from softehl.__main__ import main
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.sensitivity import design_command
+from softehl.cases.seal.sensitivity import design
 from softehl.cases.seal.sensitivity.design import (
     Change,
     Film,
+    HeldFilm,
     Lever,
     NoDesignError,
     Step,
@@ -22,9 +23,8 @@ from softehl.cases.seal.sensitivity.design import (
     designed,
     settled,
 )
-from softehl.cases.seal.sensitivity.design_command import HeldFilm
 from softehl.cases.seal.sensitivity.quantities import quantities
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.runtime.solve.newton import Newton
 from tests.cases.oring_cases import film_values
@@ -133,7 +133,7 @@ def test_a_measure_of_the_gland_is_designed_by_the_key_that_it_decides(
         first, last = {"housing_diameter": (56.3, 56.4), "groove_width": (3.74, 4.0)}[by.key]
         return [Step(first, 5.0), Step(last, 4.5)]
 
-    monkeypatch.setattr(design_command, "designed", found)
+    monkeypatch.setattr(design, "designed", found)
     assert main(["design", "oring", "friction -10%", "--by", measure]) == 0
     _, first, *_, summary, told = capsys.readouterr().out.splitlines()
     given = re.fullmatch(rf"  {measure} = (\S+) (mm|%): friction = 5 N", first)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
+from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.states.film_signs import built_up, facing, wedge_friction
+from softehl.cases.seal.solve.driver import run
+from softehl.cases.seal.states.mesh_indicators import built_up, facing, wedge_friction
 from softehl.cases.seal.states.state import CLIPPED, FilmState, Silent
 
 FLOW, SLOPE, H_STAR = 4e-4, 0.3, 2e-3

@@ -10,9 +10,9 @@ import pytest
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.discretisation import DENSITIES
+from softehl.cases.seal.gland.records import DENSITIES
 from softehl.cases.seal.meshing.o_grid import Disc, disc_mesh
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.estimate import (
     ORDER,
     Estimate,

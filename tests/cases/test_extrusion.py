@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.contact import load_stage
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
-from softehl.cases.seal.solve.path import PathDriver, StageError
-from softehl.cases.seal.solve.remedies import explained
+from softehl.cases.seal.solve.contact_stages import load_stage
+from softehl.cases.seal.solve.failure_messages import explained
+from softehl.cases.seal.solve.load_stages import PathDriver, StageError
 from softehl.cases.seal.states.contacts import contact_numbers
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.solve.solution import Branch, Status

@@ -18,9 +18,9 @@ import pytest
 import softehl
 from softehl.cases import oring
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.lock import FolderLock
-from softehl.cases.harness.record import table_digests
+from softehl.cases.harness.folder_lock import FolderLock
 from softehl.cases.harness.report.page import read_finished
+from softehl.cases.harness.run_record import table_digests
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import Observer
@@ -203,7 +203,7 @@ def test_a_folder_in_use_is_refused_and_a_killed_owner_is_not(
         [
             *(sys.executable, "-c"),
             "import sys, time; from pathlib import Path\n"
-            "from softehl.cases.harness.lock import FolderLock\n"
+            "from softehl.cases.harness.folder_lock import FolderLock\n"
             "lock = FolderLock(Path('a')); lock.take(); print('taken', flush=True)\n"
             "time.sleep(60)",
         ],

@@ -10,10 +10,10 @@ import pytest
 
 from softehl.cases.seal.correctors.layer_split import Layered
 from softehl.cases.seal.correctors.schur_corrector import SchurCorrector
-from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve import correctors
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.solve.squeeze_film import film_layer, film_loads
 from softehl.cases.seal.states.state import Outcome
 from softehl.runtime.arrays import Array

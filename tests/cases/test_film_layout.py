@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.section.layout import RATE
-from softehl.cases.seal.solve.layouts import (
+from softehl.cases.seal.solve.arc_meshing import (
     COARSEST_OF_FILM,
     RISE,
     THINNING,
@@ -15,7 +15,7 @@ from softehl.cases.seal.solve.layouts import (
     misfit,
     sizes,
 )
-from softehl.cases.seal.states.film_signs import INLET
+from softehl.cases.seal.states.mesh_indicators import INLET
 from softehl.runtime.arrays import Array
 from tests.cases.oring_cases import oring
 

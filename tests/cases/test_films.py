@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.adaptation import FITS, Adaptation, Adapted
+from softehl.cases.seal.solve.arc_meshing import film_layout, misfit
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
-from softehl.cases.seal.solve.layouts import film_layout, misfit
-from softehl.cases.seal.solve.method import DryContact, run
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.driver import DryContact, run
+from softehl.cases.seal.solve.film_solver import Film, FilmSolver, NoFilm
+from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.solve.transfer import FilmTransfer
 from softehl.cases.seal.states.estimate import Estimate
 from softehl.cases.seal.states.state import Silent

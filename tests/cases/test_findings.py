@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from softehl.cases.paper import findings_mesh
-from softehl.cases.paper.findings import FINDINGS
-from softehl.cases.paper.item import Scope
-from softehl.cases.paper.query import Query
+from softehl.cases.paper import claims
+from softehl.cases.paper.claims import FINDINGS
+from softehl.cases.paper.figure_spec import Scope
+from softehl.cases.paper.lookup import Query
 from softehl.cases.paper.states import State, Store, setup
 from softehl.cases.paper.tables import TABLE_2, unknowns
 from softehl.cases.seal.states.state import FilmRow
@@ -69,7 +69,7 @@ def test_only_ripples_that_can_be_seen_are_compared(
     ripples = dict(
         zip((800.0, 400.0, 200.0, 100.0, 50.0, 25.0), (2e-7, 1e-7, 0.0, *slow), strict=True)
     )
-    monkeypatch.setattr(findings_mesh, "ripple", lambda state: ripples[state.rod_speed])
+    monkeypatch.setattr(claims, "ripple", lambda state: ripples[state.rod_speed])
     assert decided(30, lambda *_, **__: {}) is holds
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import softehl
-from softehl.cases.harness.folders import unnamed_folder
+from softehl.cases.harness.output_dir import unnamed_folder
 from tests.docs.pages import Reader, blocks
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")

@@ -8,13 +8,13 @@ import pytest
 
 from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
-from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.contact import approach_stage, load_stage, release_stage
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, StageError
-from softehl.cases.seal.solve.remedies import explained
+from softehl.cases.seal.solve.contact_stages import approach_stage, load_stage, release_stage
+from softehl.cases.seal.solve.driver import run
+from softehl.cases.seal.solve.failure_messages import explained
+from softehl.cases.seal.solve.load_stages import PathDriver, StageError
 from softehl.cases.seal.states.state import (
     CLIPPED,
     COLLAPSED,

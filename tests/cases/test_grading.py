@@ -6,17 +6,17 @@ from math import inf, radians
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.meshing.o_grid import MOST_LAYERS, SHORT, STEEPEST_GROWTH
 from softehl.cases.seal.meshing.section_mesh import corner_jacobians
 from softehl.cases.seal.meshing.spacing import Spacing, Spot, graded
 from softehl.cases.seal.section.layout import Layout, uniform_layout
+from softehl.cases.seal.solve.arc_meshing import contact_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.layouts import contact_layout
-from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.driver import run
+from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.cases.seal.states.state import Outcome, Silent
 from softehl.runtime.arrays import Array

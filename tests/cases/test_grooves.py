@@ -17,9 +17,9 @@ from softehl.cases.seal.gland.grooves import (
     gland,
     squeeze,
 )
+from softehl.cases.seal.gland.messages import handbook
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.gland import Gland
-from softehl.cases.seal.gland.told import handbook
+from softehl.cases.seal.gland.records import Gland
 from softehl.cases.seal.gland.tolerances import read_tolerances
 
 METRIC = {

@@ -13,7 +13,7 @@ from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.report.part import FinishedRun
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.report.hand_over import (
+from softehl.cases.seal.report.system_export import (
     BLOCKS,
     FILES,
     FrictionLaw,

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.equations.system import SHEAR, WALLS
+from softehl.cases.seal.equations.definition import SHEAR, WALLS
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.contact_stages import contact_problem
+from softehl.cases.seal.solve.driver import run
+from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.states.state import Outcome, Silent
 
 

@@ -10,9 +10,9 @@ import pytest
 
 from softehl.cases.harness.case import Run
 from softehl.cases.harness.progress import Display
-from softehl.cases.harness.record import RunRecord
 from softehl.cases.harness.row import OK
-from softehl.cases.harness.session import Reporter
+from softehl.cases.harness.run_record import RunRecord
+from softehl.cases.harness.runner import Reporter
 from softehl.cases.oring import CASE
 from softehl.cases.seal.cycle.transient import March, Reading
 from softehl.cases.seal.gland.parameters import Seal

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers.materials import (
     MATERIALS,
@@ -18,7 +18,7 @@ from softehl.cases.seal.gland.rubbers.materials import (
     strains,
     unstable_at,
 )
-from softehl.cases.seal.gland.rubbers.rubber_data import Fit, fit, read_data
+from softehl.cases.seal.gland.rubbers.rubber_fit import Fit, fit, read_data
 
 TRELOAR = Path(__file__).parents[2] / "docs" / "treloar.csv"
 PUBLISHED: dict[str, Any] = {"ogden_mu": (0.63, 0.0012, -0.01), "ogden_alpha": (1.3, 5.0, -2.0)}

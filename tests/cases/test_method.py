@@ -8,7 +8,7 @@ import pytest
 
 from softehl.cases.harness.observer import Step
 from softehl.cases.seal.report.section import boundary_edges
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import (
     COLLAPSED,
     UNDER_RESOLVED,

@@ -17,9 +17,8 @@ from softehl.cases.harness import observer as harness
 from softehl.cases.harness.case import Run
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.observer import Observer
-from softehl.cases.harness.processes import completed, processes
+from softehl.cases.harness.process_pool import completed, processes, solve_side_by_side
 from softehl.cases.harness.sweep import Curve, Task, in_order
-from softehl.cases.harness.workers import solve_side_by_side
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.shipped import solve_cases

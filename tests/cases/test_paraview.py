@@ -7,11 +7,11 @@ import meshio
 import numpy as np
 import pytest
 
-from softehl.cases.harness.files import write_content
-from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.harness.file_content import write_content
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.paraview import PARTS, gland_outlines, write_paraview
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.section_view import principal_stretches, section_view
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.analyses.callbacks import read_series

@@ -8,16 +8,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.equations.system import BORE, ROD
+from softehl.cases.seal.equations.definition import BORE, ROD
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.meshing.outline import Outline, Shape
 from softehl.cases.seal.meshing.section_mesher import Sizes
 from softehl.cases.seal.section.layout import Layout
+from softehl.cases.seal.solve.arc_meshing import contact_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
-from softehl.cases.seal.solve.layouts import contact_layout
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.states.contacts import contact_pressure, unsealed
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array

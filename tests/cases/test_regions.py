@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import ContactLoads
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers.regions import PRESETS
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.inlet import inlet_length
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.states.contacts import contact_pressure
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array

@@ -17,14 +17,19 @@ from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import regime
 from softehl.cases.seal.report import style
-from softehl.cases.seal.report.curve import curve_figure, fitted_exponent
-from softehl.cases.seal.report.drawing import gland_figure
+from softehl.cases.seal.report.gland_drawing import gland_figure
+from softehl.cases.seal.report.pictures import (
+    crossing,
+    curve_figure,
+    fitted_exponent,
+    hersey_um,
+    stribeck_figure,
+)
 from softehl.cases.seal.report.section import (
     View,
     nodal_von_mises,
     section_figure,
 )
-from softehl.cases.seal.report.stribeck import crossing, hersey_um, stribeck_figure
 from softehl.cases.seal.states.state import COLLAPSED, OSCILLATING, FilmRow, Profile, Section
 from tests.cases.oring_cases import film_values
 

@@ -14,13 +14,12 @@ import pytest
 import softehl
 from softehl.cases.harness import sweep
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.paper import compute as computing
-from softehl.cases.paper.catalogue import ITEMS
+from softehl.cases.paper import reproduce as computing
 from softehl.cases.paper.checks import observed_order
-from softehl.cases.paper.command import reproduce_items
-from softehl.cases.paper.inverse import film_of, largest_inlet_gradient
-from softehl.cases.paper.item import Scope
-from softehl.cases.paper.query import angle, ripple
+from softehl.cases.paper.figure_spec import Scope
+from softehl.cases.paper.inverse_theory import film_of, largest_inlet_gradient
+from softehl.cases.paper.lookup import angle, ripple
+from softehl.cases.paper.reproduce import ITEMS, reproduce_items
 from softehl.cases.paper.states import Store, ask, merged, setup
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import FilmRow

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
-from softehl.cases.seal.solve.contact import contact_problem
+from softehl.cases.seal.equations.system import build_system
+from softehl.cases.seal.solve.contact_stages import contact_problem
 from softehl.cases.seal.states.contacts import contact_pressure
-from softehl.cases.seal.states.film_signs import (
+from softehl.cases.seal.states.mesh_indicators import (
     THIN,
     end_gap,
     inlet_ratio,

@@ -11,11 +11,11 @@ from pydantic import ValidationError
 
 from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
-from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import SurfacePair, regime
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.solve.inlet import inlet_length
-from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmRow, FilmState, Silent
 from softehl.runtime.discretisation.step_bounds import ChangesLittle
 

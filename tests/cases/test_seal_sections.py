@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.sections import SECTIONS
-from softehl.cases.seal.gland.sections.keys import shape_of
+from softehl.cases.seal.gland.sections.section_keys import shape_of
+from softehl.cases.seal.gland.sections.shapes import SECTIONS
 from softehl.cases.seal.section.layout import pressure_boundary, uniform_layout
-from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes, contact_key
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.contact_stages import contact_problem
+from softehl.cases.seal.solve.driver import run
+from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.states.contacts import (
     CONTACT_FILM,
     contact_edges,

@@ -13,18 +13,23 @@ import pytest
 from ezdxf.filemanagement import new
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.sections import SECTIONS
-from softehl.cases.seal.gland.sections.files import finer, outline_of, read_mesh, read_outline
-from softehl.cases.seal.gland.sections.keys import lobes
+from softehl.cases.seal.gland.sections.section_files import (
+    finer,
+    outline_of,
+    read_mesh,
+    read_outline,
+)
+from softehl.cases.seal.gland.sections.section_keys import lobes
+from softehl.cases.seal.gland.sections.shapes import SECTIONS
 from softehl.cases.seal.meshing.outline import Arc, Shape
 from softehl.cases.seal.meshing.outline_mesh import outline_mesh
 from softehl.cases.seal.meshing.section_mesh import SectionMesh, corner_jacobians
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.driver import run
+from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.cases.shipped import solve_cases
 

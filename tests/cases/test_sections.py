@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 
 from softehl.cases.document import DOCS
-from softehl.cases.seal.gland.sections import SECTIONS
-from softehl.cases.seal.gland.sections.base import Section, parts_of
-from softehl.cases.seal.gland.sections.d_ring import DRing
-from softehl.cases.seal.gland.sections.rectangular import Rectangular
-from softehl.cases.seal.gland.sections.round import Round
-from softehl.cases.seal.gland.sections.trapezoid import Trapezoid
-from softehl.cases.seal.gland.sections.u_cup import UCup
-from softehl.cases.seal.gland.sections.x_ring import XRing
+from softehl.cases.seal.gland.sections.shapes import (
+    SECTIONS,
+    DRing,
+    Rectangular,
+    Round,
+    Section,
+    Trapezoid,
+    UCup,
+    XRing,
+    parts_of,
+)
 from softehl.cases.seal.meshing.outline import Outline
 from softehl.cases.seal.meshing.outline_mesh import outline_mesh
 from softehl.cases.seal.meshing.section_mesh import corner_jacobians

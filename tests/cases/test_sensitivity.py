@@ -16,11 +16,12 @@ import pytest
 from softehl.__main__ import main
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.sections import SECTIONS
-from softehl.cases.seal.gland.sections.keys import dimensions
+from softehl.cases.seal.gland.sections.section_keys import dimensions
+from softehl.cases.seal.gland.sections.shapes import SECTIONS
+from softehl.cases.seal.gland.sensitivity_keys import LENGTHS
 from softehl.cases.seal.gland.tolerances import band, read_tolerances
-from softehl.cases.seal.gland.varied import LENGTHS
-from softehl.cases.seal.sensitivity.following import edges, shift_rate, shifted, velocities
+from softehl.cases.seal.sensitivity.frozen_mesh_map import FilmCase
+from softehl.cases.seal.sensitivity.moving_mesh import edges, shift_rate, shifted, velocities
 from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, Tangent
 from softehl.cases.seal.sensitivity.quantities import (
     QUANTITIES,
@@ -35,9 +36,8 @@ from softehl.cases.seal.sensitivity.sensitivity import (
     rates_of,
     sensitivities,
 )
-from softehl.cases.seal.sensitivity.variation import FilmCase
-from softehl.cases.seal.solve.films import Film
-from softehl.cases.seal.solve.method import DryContact, run
+from softehl.cases.seal.solve.driver import DryContact, run
+from softehl.cases.seal.solve.film_solver import Film
 from softehl.cases.seal.states.results import film_numbers, film_state
 from softehl.cases.seal.states.sensitivity_table import SensitivityRow, resolved
 from softehl.cases.seal.states.state import FilmRow, Silent

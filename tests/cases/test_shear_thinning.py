@@ -10,7 +10,7 @@ from scipy.integrate import fixed_quad
 from scipy.optimize import brentq
 
 from softehl.cases.cycle import Cycle
-from softehl.cases.seal.equations.system import FILM, blocks_of
+from softehl.cases.seal.equations.definition import FILM, blocks_of
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.slider.parameters import Slider
 from tests.cases.test_slider import row

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.correctors.proximal_term import Anchored, Relaxed
-from softehl.cases.seal.equations.system import DISPLACEMENT
+from softehl.cases.seal.equations.definition import DISPLACEMENT
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.contact import OFFSET
+from softehl.cases.seal.solve.contact_stages import OFFSET
 from softehl.cases.seal.solve.correctors import FilmCorrectors
-from softehl.cases.seal.solve.films import NoFilm
+from softehl.cases.seal.solve.driver import DryContact
+from softehl.cases.seal.solve.film_solver import NoFilm
 from softehl.cases.seal.solve.inlet import InletScales
-from softehl.cases.seal.solve.method import DryContact
 from softehl.cases.seal.solve.squeeze_film import SqueezeFilm, gap_masses, pressed_film
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array

@@ -5,10 +5,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system, seal_study
+from softehl.cases.seal.equations.definition import PRESSURE, ROD, Block, blocks_of
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.scales import film_flux
-from softehl.cases.seal.equations.system import PRESSURE, ROD, Block, blocks_of
+from softehl.cases.seal.equations.system import SealSystem, build_system, seal_study
 from softehl.cases.seal.section.section import seal_section
 from tests.cases.oring_cases import oring
 
@@ -162,6 +162,6 @@ def test_a_kernel_that_asks_for_what_nobody_gives_is_named() -> None:
     stranger = Block("stranger", "contact", "arc_nodes", (ROD,), "film")
     p = oring(density=1)
     with pytest.raises(
-        KeyError, match=r"'stranger' asks for offset; cases/seal/equations/system.py gives"
+        KeyError, match=r"'stranger' asks for offset; cases/seal/equations/definition.py gives"
     ):
         seal_study(p, seal_section(p), (*blocks_of(p), stranger))

@@ -12,10 +12,10 @@ import pytest
 
 from softehl.cases.seal.gland.trade.finish_names import read_finish
 from softehl.cases.seal.gland.trade.fit_names import DEVIATIONS, GRADES, STEPS, band, read_fit
+from softehl.cases.seal.gland.trade.normalise_text import NotUnderstoodError
 from softehl.cases.seal.gland.trade.oil_names import dynamic, read_oil_name
 from softehl.cases.seal.gland.trade.ring_names import RingName, read_ring
 from softehl.cases.seal.gland.trade.rubber_names import RubberName, read_rubber
-from softehl.cases.seal.gland.trade.text import NotUnderstoodError
 
 DATA: dict[str, Any] = json.loads(
     Path(__file__).with_name("trade_names.json").read_text(encoding="utf-8")

@@ -13,8 +13,8 @@ import pytest
 
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import FULL
-from softehl.cases.seal.report.stribeck import crossing
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.report.pictures import crossing
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import FilmState, Silent
 
 SPEEDS = (800.0, 400.0, 200.0, 100.0)

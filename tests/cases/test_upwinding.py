@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import Outcome
 from softehl.runtime.discretisation.problem import Problem
 from tests.cases.oring_cases import oring

@@ -11,10 +11,10 @@ from softehl.cases.seal.gland.grooves import gland
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers.hardness import shore_band, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import MATERIALS, shear_modulus
-from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
+from softehl.cases.seal.gland.rubbers.rubber_fit import fit, read_data
 from softehl.cases.seal.gland.trade.oil_names import GRADES
 from softehl.cases.seal.gland.trade.rubber_names import RANGES, read_rubber
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import Silent
 
 DOCS = Path(__file__).parents[2] / "docs"

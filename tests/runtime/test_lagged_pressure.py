@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.correctors.perturbed_lagrangian import LaggedPressure, element_pressures
-from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.solve.contact import contact_problem
+from softehl.cases.seal.equations.system import SealSystem, build_system
+from softehl.cases.seal.solve.contact_stages import contact_problem
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.kernels.kernel import load_kernel

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from softehl.cases.harness.case import Alarm, AnyCase, load_case
-from softehl.cases.harness.curve import CurveFolder
-from softehl.cases.harness.earlier import advice_of, disbelief, edited_table
+from softehl.cases.harness.curve_folder import CurveFolder
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
+from softehl.cases.harness.resume import advice_of, disbelief, edited_table
 from softehl.runtime.io import Cell, read_json, replacing, write_text
 
 _HERE = Path(__file__).parent

@@ -2,13 +2,14 @@
 
 The rates are those of the content of the film, not of its thickness, and of the axial place of the
 surface (docs/film-physics.md). Each step is solved like a steady film: the section is condensed as
-seldom as possible.
+seldom as possible. A march is written into tables at the end of a cycle or within it, and restarted
+from them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
 from math import nan
 
 import numpy as np
@@ -16,9 +17,9 @@ import numpy as np
 from softehl.cases.seal.correctors.layer_split import Layer, Layered
 from softehl.cases.seal.correctors.schur_corrector import SchurCorrector
 from softehl.cases.seal.cycle.motion import Motion, RodFilm, missing
-from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.definition import FILM, PRESSURE, SQUEEZE
 from softehl.cases.seal.equations.loads import FilmLoads
-from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE
+from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.states.results import rough_numbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.problem import Problem
@@ -108,7 +109,7 @@ class March(Stepper):
     goal: float = 0.0
     told: Callable[[Instant, Reading], None] = lambda instant, reading: None
 
-    def start_parameter(self, x: Array) -> Reading:
+    def initialise(self, x: Array) -> Reading:
         """From the steady film x (n,) at t = 0; its reading."""
         self.dt = 1e-3 * self.motion.period
         film = self._loads(0.0)
@@ -128,7 +129,7 @@ class March(Stepper):
         U = reading.rod_speed_mm_s
         return 2.0 * reading.flux_air_mm2_s / U if U > 0.0 else None
 
-    def initial_direction(self, reading: Reading) -> None:
+    def deposit(self, reading: Reading) -> None:
         """Put what an outstroke leaves on the rod."""
         left = self.left(reading)
         if left is not None:
@@ -182,7 +183,7 @@ class March(Stepper):
         instant = self._instant(attempt.problem, attempt.solution.x, attempt.step_length)
         reading = self._reading(attempt.problem, attempt.film, instant, attempt.solution.iterations)
         self.behind, self.dt = [instant, *self.behind[:2]], attempt.next_step
-        self.initial_direction(reading)
+        self.deposit(reading)
         self.told(instant, reading)
 
     def end(self) -> End | None:
@@ -294,3 +295,74 @@ class March(Stepper):
             iterations=iterations,
             lambda_ratio=rough.get("lambda_ratio", nan),
         )
+
+
+STEP = "next_step_s"
+"""Column of the step that comes next, the same in every line."""
+
+Tables = Mapping[str, Mapping[str, Array]]
+"""Name of a table -> column -> values (n,)."""
+
+
+def packed(march: March) -> dict[str, Array]:
+    """Start of the next step: a column for each of the last instants, newest first.
+
+    A column holds the time, what the film holds, fluxes and volumes at both ends, the content of
+    the segments and the unknowns, (n,) in all.
+    """
+    columns = {
+        f"instant_{k}": np.concatenate([[i.t, i.held], i.fluxes, i.volumes, i.content.ravel(), i.x])
+        for k, i in enumerate(march.behind)
+    }
+    return {**columns, STEP: np.full(len(columns["instant_0"]), march.dt)}
+
+
+def unpacked(march: March, table: Mapping[str, Array]) -> None:
+    """Put a march where `packed` took it; it has begun.  ValueError for another mesh."""
+    content = march.behind[0].content
+    length = 6 + content.size + len(march.behind[0].x)
+    if len(table[STEP]) != length:
+        raise ValueError(f"a state of {len(table[STEP])} numbers does not fit {length}")
+    ends = 2, 4, 6, 6 + content.size
+    behind = []
+    for name in sorted(name for name in table if name != STEP):
+        (t, held), fluxes, volumes, filled, x = np.split(table[name], ends)
+        filled = filled.reshape(content.shape)
+        behind.append(Instant(float(t), x, filled, float(held), fluxes, volumes))
+    march.behind, march.dt = behind, float(table[STEP][0])
+
+
+def repeated(march: March, loop: Mapping[str, Array]) -> list[Reading]:
+    """The readings of a cycle from its table; what its outstrokes left is on the rod again."""
+    names = [field.name for field in fields(Reading)]
+    rows = zip(*(loop[name].tolist() for name in names), strict=True)
+    past = [Reading(*row) for row in rows]
+    for reading in past:
+        march.deposit(reading)
+    return past
+
+
+def drafted(march: March, cycle: Tables) -> dict[str, Array]:
+    """A cycle in the middle of it: its tables so far, the march and its tangent."""
+    tangent = march.corrector.tangent
+    assert tangent.state is not None
+    assert tangent.accepted is not None
+    numbers = np.array([march.condensed_at, float(tangent.outdated)])
+    held = {"state": tangent.state, "accepted": tangent.accepted, "numbers": numbers}
+    tables: Tables = {**cycle, "march": packed(march), "tangent": held}
+    return {f"{t}/{name}": column for t, table in tables.items() for name, column in table.items()}
+
+
+def taken_up(march: March, arrays: Mapping[str, Array]) -> Tables:
+    """Put a march where `drafted` took it; the tables of the cycle so far."""
+    tables: dict[str, dict[str, Array]] = {}
+    for name, column in arrays.items():
+        table, _, own = name.partition("/")
+        tables.setdefault(table, {})[own] = column
+    unpacked(march, tables["march"])
+    tangent = tables["tangent"]
+    t, outdated = tangent["numbers"].tolist()
+    march.condense(t, tangent["state"])
+    march.corrector.tangent.accepted = tangent["accepted"]
+    march.corrector.tangent.outdated = bool(outdated)
+    return tables

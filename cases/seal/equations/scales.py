@@ -6,8 +6,7 @@ from math import pi
 
 import numpy as np
 
-from softehl.cases.seal.gland.records.duty import Duty
-from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.records import Duty, Gland
 from softehl.runtime.arrays import Array
 
 GAP, ROTATION, VOID = 0.01, 1e-3, 1.0

@@ -1,265 +1,410 @@
-"""The coupled system of a seal, declared once: fields, element blocks, obstacles, parameters.
-
-Another field, obstacle or term of the film is one line of `FIELDS` or `BLOCKS`; a kernel is given
-those of the values below that it names. `cases.seal.equations.equations` makes equations of it on a
-section, and nobody else knows how fields are called and where their unknowns stand.
-"""
+"""System of a seal: the defined equations on a section, its unknowns, and its problems."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import copysign
-from typing import Literal, TypeAlias
+from fractions import Fraction
+from math import pi
+from typing import Any
 
+import numpy as np
+
+from softehl.cases.seal.correctors.perturbed_lagrangian import element_pressures
 from softehl.cases.seal.equations import scales
+from softehl.cases.seal.equations.definition import (
+    AIR_WALL,
+    AXIAL,
+    BORE,
+    DISPLACEMENT,
+    FIELDS,
+    FILM,
+    MOVED,
+    PRESSURE,
+    ROD,
+    ROTATION,
+    SHEAR,
+    VOID,
+    WALLS,
+    Block,
+    Field,
+    Group,
+    Place,
+    Values,
+    blocks_of,
+    contact_values,
+    film_values,
+    obstacles_of,
+    values_at_rest,
+)
 from softehl.cases.seal.equations.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.discretisation import Discretisation
-from softehl.cases.seal.gland.records.gland import Gland
-from softehl.cases.seal.gland.surfaces import void_values
-from softehl.cases.seal.section.section import BODY, SealSection
-from softehl.runtime.contact.rigid_obstacles import Obstacle, inner_cylinder, outer_cylinder, plane
-from softehl.runtime.discretisation.quadrature import (
-    content_rule,
-    facet_rule,
-    film_rule,
-    rupture_rule,
+from softehl.cases.seal.gland.records import Discretisation
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
+from softehl.cases.seal.section.layout import Layout
+from softehl.cases.seal.section.section import SealSection, seal_section
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.contact.rigid_obstacles import Obstacle, contact_data, tributary_areas
+from softehl.runtime.discretisation.dofmap import DofLayout, Numbering, chain_dofs, separate_dofs
+from softehl.runtime.discretisation.element_blocks import ElementKernel
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.step_bounds import (
+    ChangesLittle,
+    Guard,
+    KeepsOrientation,
+    StaysPositive,
 )
-from softehl.runtime.kernels.kernel import Rule
-
-Values: TypeAlias = Mapping[str, float]
-"""Parameters of a kernel by their names."""
-
-Place = Literal["nodes", "film", "arc_nodes", "outer_nodes", "wall_nodes", "section"]
-Group = Literal["solid", "load", "contact", "film", "squeeze", "support"]
+from softehl.runtime.kernels.kernel import load_kernel
+from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.study import Study
 
 
-@dataclass(frozen=True)
-class Field:
-    """A field of unknowns; a case has those that its blocks know.
+@dataclass(frozen=True, eq=False)
+class SealUnknowns:
+    """A section and its unknowns: what stands where in a vector of them, and what it means."""
 
-    on: things that have one of them. A node has two displacements, a segment of the film the
-    coefficients of a polynomial; other fields are of the nodes of the arc, of the other boundary,
-    of what may touch a wall, or of the section.
-    scale: reference size of its residuals. of: names of its unknowns, left out: one, its own.
+    parameters: Seal
+    section: SealSection
+    numbering: Numbering
+
+    @property
+    def mesh(self) -> SectionMesh:
+        """The undeformed mesh."""
+        return self.section.mesh
+
+    @property
+    def rod_radius(self) -> float:
+        """Place r of the surface that slides, mm: radius of a rod, less that of a bore."""
+        return 0.5 * self.parameters.rod_diameter
+
+    @property
+    def side(self) -> float:
+        """1 for a rod seal, -1 for a piston seal, whose forces have the other sign."""
+        return -1.0 if self.parameters.piston else 1.0
+
+    @property
+    def around(self) -> float:
+        """Circumference of the surface that slides, mm."""
+        return pi * abs(self.parameters.rod_diameter)
+
+    @property
+    def rod_areas(self) -> Array:
+        """Tributary areas (arc nodes,) of the rod multipliers, mm^2."""
+        return self.areas("arc_nodes")
+
+    def areas(self, on: Place) -> Array:
+        """Tributary areas (n,) of the nodes that may meet the rod, the housing or a wall, mm^2."""
+        nodes, segments = self.section.chains[on]
+        return tributary_areas(self.mesh.points, segments, nodes)
+
+    @property
+    def layout(self) -> DofLayout:
+        """The vector of unknowns, one for all stages."""
+        return self.numbering.layout
+
+    def at_rest(self) -> Array:
+        """Unknowns of the undeformed section: all zero."""
+        return np.zeros(self.layout.total)
+
+    def displacements(self, x: Array) -> Array:
+        """Displacements (V, 2) in (z, r), mm."""
+        return x[self.layout.part(DISPLACEMENT)].reshape(-1, 2)
+
+    def deformed(self, x: Array) -> Array:
+        """Deformed nodes (V, 2) in (z, r), mm."""
+        return np.asarray(self.mesh.points + self.displacements(x))
+
+    def arc_film(self, x: Array) -> tuple[Array, Array]:
+        """Positions z and distances h from the rod of the deformed arc nodes, (arc nodes,), mm."""
+        z, r = self.deformed(x)[self.mesh.arc_nodes].T
+        return z, r - self.rod_radius
+
+    def rod_multipliers(self, x: Array) -> Array:
+        """Contact multipliers (arc nodes,) of the rod, MPa; negative where it presses."""
+        return x[self.layout.part(ROD)]
+
+    def moment(self, x: Array) -> float:
+        """Moment that holds the mean rotation of the section, N mm."""
+        return float(x[self.layout.part(ROTATION)][0])
+
+    def pressure_dofs(self, field: str = PRESSURE) -> Integers:
+        """Numbers (segments, m_p + 1) of the pressure unknowns of each segment of the film."""
+        return self.numbering.rows(FILM, field)
+
+    def pressures(self, x: Array) -> Array:
+        """All pressure unknowns, MPa."""
+        return x[self.layout.part(PRESSURE)]
+
+    @property
+    def pressure_count(self) -> int:
+        """Number of pressure unknowns."""
+        return self.layout.count(PRESSURE)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of unknowns, as a run records them."""
+        return {"total": self.layout.total, PRESSURE: self.pressure_count}
+
+    def wall_forces(self, x: Array) -> Array:
+        """Normal forces (nodes,) of the housing and its walls on the nodes, N."""
+        total = np.zeros(len(self.mesh.points))
+        for name, on in WALLS.items():
+            total[self.section.chains[on][0]] += self.pressing(name, x) * self.areas(on)
+        return total
+
+    def pressing(self, name: str, x: Array) -> Array:
+        """Nominal pressures (n,) of an obstacle on the nodes that may touch it, MPa, >= 0."""
+        return np.maximum(-x[self.layout.part(name)], 0.0)
+
+    def housing_friction(self, x: Array) -> float:
+        """Axial force of friction of the housing on the section, to the air side, N."""
+        if not self.parameters.rubs:
+            return 0.0
+        return float(x[self.layout.part(SHEAR[BORE])] @ self.areas(WALLS[BORE]))
+
+    def axial_force(self, x: Array) -> float:
+        """Force that the hold exerts on the section, to the air side, N."""
+        return 0.0 - self.side * float(x[self.layout.part(AXIAL)][0])
+
+    @property
+    def film_ends(self) -> Integers:
+        """Pressure unknowns at the sealed and the air end of the film, (15), for "fe" and "dg"."""
+        return self._ends(PRESSURE)
+
+    def contact_fields(self) -> tuple[Field, ...]:
+        """The fields that contact knows: film pressures are all zero in it."""
+        return tuple(field for field in self._fields if field.on != "film")
+
+    def film_fields(self) -> tuple[Field, ...]:
+        """The fields that the film alone has."""
+        return tuple(field for field in self._fields if field.on == "film")
+
+    @property
+    def _fields(self) -> tuple[Field, ...]:
+        return tuple(field for field in FIELDS if field.name in self.layout.names)
+
+    def _ends(self, field: str) -> Integers:
+        return self.layout.dofs(field)[[0, -1]]
+
+
+NUMBERED = {field.name: field.unknowns for field in FIELDS}
+"""Fields with the names of their unknowns, in the order of the vector."""
+
+_ON = {field.name: field.on for field in FIELDS}
+
+_STEP = 0.9
+"""Share of its thickness that a film may lose in an iteration. Nine seals take 1.5 % more of them
+with 0.7, 2 % fewer with 0.97; a rough film, which may change by sigma in any case, none."""
+
+
+def seal_study(p: Seal, section: SealSection, blocks: Sequence[Block]) -> Study:
+    """The study of a section: nothing moves, nothing presses, no unknown is prescribed.
+
+    Raises KeyError for a kernel that asks for a value that nobody gives.
+    """
+    places = _film_places(p, section)
+    still = film_values(p, FilmLoads(0.0, "out", 0.0, np.empty(0)))
+    elements = {
+        **section.elements,
+        "film_nodes": np.empty((len(places["film_nodes"]), 0), np.int64),
+    }
+    study = Study(Mesh(section.mesh.points, {"quad4": section.mesh.quads}), "axisymmetric")
+    for block in blocks:
+        kernel = load_kernel(block.kernel_of(p))
+        own = [name for name, node in kernel.places if node is None]
+        values = chosen(block, kernel, values_at_rest(block, p, section) or still)
+        by_steps = {"rate"} if any("_rate" in name for name in kernel.data) else set()
+        given: dict[str, Any] = {n: v for n, v in values.items() if n not in by_steps}
+        study.add(
+            block.name,
+            kernel,
+            on=elements[block.elements],
+            shared=[u for u, f in zip(own, block.fields, strict=False) if _ON[f] == "section"],
+            called=dict(zip(own, block.fields, strict=False)),
+            along={f: places[block.elements] for f in block.fields if _ON[f] == "film"},
+            rule=block.rule(p) if block.rule else None,
+            constant=block.constant,
+            **given | _contact_constants(p, section, block, kernel.data),
+        )
+    return study
+
+
+def _film_places(p: Discretisation, section: SealSection) -> Mapping[str, Integers]:
+    """Places (n, k) of film pressures on the sets of elements that know them.
+
+    m_p a segment and one more where pressures are continuous, m_p + 1 a segment in (22).
+    """
+    number = chain_dofs if p.reynolds == "fe" else separate_dofs
+    arc = number(section.mesh.arc, p.pressure_order, 0)
+    facets = np.concatenate([arc[:-1], arc[1:]], axis=1)
+    return {"arc": arc, "facets": facets, "film_nodes": np.arange(arc.max() + 1)[:, None]}
+
+
+def _contact_constants(
+    p: Seal, section: SealSection, block: Block, names: Sequence[str]
+) -> dict[str, Array]:
+    """Constants (n,) of contact elements by these names; none of other blocks."""
+    if block.group != "contact":
+        return {}
+    chain = section.chains[block.elements]
+    stiffness, obstacle = section.node_moduli(p)[chain[0]], obstacles_of(p)[block.name]
+    values = contact_data(obstacle, section.mesh.points, *chain, stiffness)
+    known = dict(zip(("n_z", "n_r", "c", "area", "rho"), values.T, strict=True))
+    return {name: value for name, value in known.items() if name in names}
+
+
+def chosen(block: Block, kernel: ElementKernel, values: Values) -> Values:
+    """Values that the kernel of a block asks for.  Raises KeyError for one that is not there."""
+    missing = [name for name in kernel.parameters if name not in values]
+    if missing:
+        raise KeyError(
+            f"block {block.name!r} asks for {', '.join(missing)}; "
+            f"cases/seal/equations/definition.py gives {block.group} blocks {', '.join(values)}"
+        )
+    return {name: values[name] for name in kernel.parameters}
+
+
+@dataclass(frozen=True, eq=False)
+class SealSystem(SealUnknowns):
+    """A section with its unknowns and equations: everything that does not change while loads do.
+
+    blocks: those that the case has. obstacles: by block name. problem: the contact problem at
+    p_s = 0 with the film switched off and its pressures prescribed to be zero; mean rotation is
+    held in it, even if a later stage lets it go.
     """
 
-    name: str
-    on: Place
-    scale: Callable[[Seal], float]
-    of: tuple[str, ...] = ()
+    blocks: tuple[Block, ...]
+    obstacles: Mapping[str, Obstacle]
+    problem: Problem
+
+    @classmethod
+    def of(cls, p: Seal, section: SealSection) -> SealSystem:
+        """The system of a case on a section."""
+        present = blocks_of(p)
+        posed = seal_study(p, section, present).system(NUMBERED)
+        numbering = posed.numbering
+        cells = section.coordinates("cells"), numbering.at(MOVED, section.mesh.quads)
+        still = replace(
+            posed.resting(),
+            scales={f.name: f.scale(p) for f in FIELDS if f.name in numbering.layout.names},
+            absolute=True,
+            guards=(KeepsOrientation(*cells),),
+        )
+        off = {block.name: None for block in present if block.of_film}
+        system = cls(p, section, numbering, present, obstacles_of(p), still.with_parameters(**off))
+        films = [system.layout.dofs(field.name) for field in system.film_fields()]
+        return replace(system, problem=system.problem.with_fixed(films, [0.0] * len(films)))
+
+    def moved(self, p: Seal, section: SealSection) -> SealSystem:
+        """The system of other numbers on the same mesh with its nodes moved."""
+        found = SealSystem.of(p, section)
+        structure = self.problem.assembler.structure  # what is known of its pattern stays
+        assembler = replace(found.problem.assembler, structure=structure)
+        return replace(found, problem=replace(found.problem, assembler=assembler))
+
+    # --- blocks -----------------------------------------------------------------------------------
 
     @property
-    def unknowns(self) -> tuple[str, ...]:
-        """Names of its unknowns."""
-        return self.of or (self.name,)
-
-
-@dataclass(frozen=True)
-class Block:
-    """Elements of one kernel.
-
-    kernel: its name, with words of the case (see `kernel_of`); the solid is that of its region, ""
-    where it is the case's.
-    elements: a set of `SealSection.elements`. fields: of its unknowns that are not displacements,
-    in the order in which the kernel has them. group: which values its parameters are taken from.
-    needed: whether a case has it. rule: its quadrature, None for the kernel's own.
-    constant: the tangent depends on parameters alone.
-    """
-
-    name: str
-    kernel: str
-    elements: str
-    fields: tuple[str, ...]
-    group: Group
-    needed: Callable[[Seal], bool] = lambda _: True
-    rule: Callable[[Seal], Rule] | None = None
-    constant: bool = False
-    region: str = ""
+    def solids(self) -> tuple[str, ...]:
+        """Names of the blocks of the solid; their elements in order are those of the mesh."""
+        return tuple(block.name for block in self.blocks if block.group == "solid")
 
     @property
-    def on_arc(self) -> bool:
-        """True for what the modified Newton iteration treats exactly, with the film."""
-        return self.elements in ("arc", "arc_nodes", "facets", "film_nodes", "sealed_arc")
+    def bulk_moduli(self) -> Array:
+        """Bulk modulus (elements,) of each element, MPa."""
+        solids = [block for block in self.blocks if block.group == "solid"]
+        moduli = [self.parameters.rubber(block.region).bulk_modulus for block in solids]
+        return np.repeat(moduli, [len(self.section.elements[b.elements]) for b in solids])
 
-    @property
-    def of_film(self) -> bool:
-        """True for what contact knows nothing of."""
-        return self.group in ("film", "squeeze")
+    def element_pressures(self, x: Array) -> Array:
+        """Mean stress (elements,) of the section x (n,), MPa, positive in tension."""
+        return element_pressures(self.problem, self.solids, x)
 
-    def kernel_of(self, p: Seal) -> str:
-        """Name of the kernel in a case."""
-        return self.kernel.format(
-            solid=p.rubber(self.region).solid_kernel(p.solid),
-            edge="_corner" if p.opens else "",
-            oil=p.film_suffix,
-            rough="_rough" if p.rough else "",
-            conserving="rough" if p.rough else f"conserving{p.film_suffix}",
+    def reaction(self, name: str, x: Array) -> float:
+        """Axial force of a wall on the section, the sum of normal forces on the bore, N."""
+        if name == AIR_WALL and self.parameters.opens:
+            block = self.problem.assembler.block(name)
+            residual = block.residual(x, self.problem.parameters[name])
+            return self.side * float(residual[:, 0].sum())
+        return float(self.pressing(name, x) @ self.areas(WALLS[name]))
+
+    # --- loads ------------------------------------------------------------------------------------
+
+    def contact_problem(self, loads: ContactLoads) -> Problem:
+        """Frictionless contact (9)-(10) under a sealed pressure (8)."""
+        problem = self.problem.with_parameters(**contact_values(loads))
+        if loads.moment is not None:
+            problem = problem.also_fixed(self.layout.dofs(ROTATION), loads.moment)
+        if loads.place is not None:
+            return problem
+        return problem.also_fixed(self.layout.dofs(AXIAL), -self.side * loads.axial_force)
+
+    def film_problem(self, film: FilmLoads) -> Problem:
+        """Film forces (18) and the Reynolds equation (25); the contact with the rod is without."""
+        contact = self.contact_problem(ContactLoads(film.sealed_pressure, place=film.place))
+        problem = contact.with_parameters(
+            **{ROD: None, "sealed_arc": {"pressure": 0.0}},  # the film bears the arc
+            **self._given("film", film_values(self.parameters, film)),
+        )
+        fixed = [self.film_ends, self.layout.dofs(ROD)]
+        values: list[Array | float] = [film.ends, 0.0]
+        if self.parameters.conserving:
+            fixed.append(self._ends(VOID))
+            values.append(np.array(film.inflow))
+        if film.place is None:
+            fixed.append(self.layout.dofs(AXIAL))
+            values.append(0.0)
+        if film.moment is not None:
+            fixed.append(self.layout.dofs(ROTATION))
+            values.append(film.moment)
+        fluxes = self.flux_scales(film.speed, film.gap)
+        return replace(
+            problem.with_fixed(fixed, values),
+            scales={**problem.scales, PRESSURE: fluxes},
+            guards=(*problem.guards, self.film_guard()),
         )
 
+    def squeeze_values(self, rate: float) -> dict[str, Values]:
+        """Parameters of the block of what the film holds; rate: coefficient of d/dt, 1/s."""
+        values = {"rod_radius": self.rod_radius, "rate": rate, **self.parameters.surfaces.values()}
+        return self._given("squeeze", values)
 
-DISPLACEMENT, PRESSURE, ROD = "displacement", "pressure", "rod"
-"""Displacements; film pressures; contact multipliers of the rod."""
+    def film_guard(self) -> Guard:
+        """Film thickness at the nodes of the arc: positive in every iterate between smooth
+        surfaces; between rough ones, which may interpenetrate, it changes little at a time.
+        """
+        nodes = self.mesh.arc_nodes
+        radii = self.numbering.nodal["u_r"][nodes]
+        gaps = self.mesh.points[nodes, 1] - self.rod_radius
+        if self.parameters.rough:
+            return ChangesLittle(radii, gaps, _STEP, self.parameters.surfaces.sigma)
+        return StaysPositive(radii, gaps, _STEP)
 
-MOVED = "u_z", "u_r"
-"""Components of a displacement."""
+    def flux_scales(self, speed: float, gap: Array) -> Array:
+        """Reference fluxes (n,), mm^2/s, of the equations of the pressure at |U| (mm/s).
 
-VOID = "void"
-"""Void fractions of the film, where its pressures stand."""
+        gap: (arc nodes,) film thickness, mm, near enough.
+        """
+        p, arc = self.parameters, self.mesh.points[self.mesh.arc_nodes]
+        h, dx = np.maximum(gap[1:], gap[:-1]), np.linalg.norm(np.diff(arc, axis=0), axis=1)
+        driven = scales.pressure_flux(h, dx, p.pressure_order, p.viscosity)
+        largest = np.zeros(self.pressure_count)
+        np.maximum.at(
+            largest, self.pressure_dofs() - self.layout.part(PRESSURE).start, driven[:, None]
+        )
+        return scales.film_flux(speed) + largest
 
-ROTATION, AXIAL = "rotation", "axial"
-"""Moment that holds the mean rotation of the section; force that holds its mean axial place."""
-
-SOLID, FILM, FACET, SQUEEZE = "solid", "film", "facet", "squeeze"
-"""Blocks whose fields are results: the section, segments of the film, what lies between them, and
-what the film holds where it changes with time."""
-
-BORE, SEALED_WALL, AIR_WALL = "housing", "sealed_wall", "air_wall"
-WALLS: dict[str, Place] = {BORE: "outer_nodes", SEALED_WALL: "wall_nodes", AIR_WALL: "wall_nodes"}
-"""The other obstacles, and what may touch them; each has a field of multipliers of its own."""
-
-FRICTION = "contact_friction"
-SHEAR = {name: f"{name}_shear" for name in WALLS}
-"""Kernel of contact with friction, and the tangential stresses that it adds to each obstacle."""
-
-FIELDS = (
-    Field(DISPLACEMENT, "nodes", scales.force, MOVED),
-    Field(PRESSURE, "film", scales.largest_flux),
-    Field(VOID, "film", lambda _: scales.VOID),
-    Field(ROD, "arc_nodes", scales.gap),
-    *(Field(name, nodes, scales.gap) for name, nodes in WALLS.items()),
-    *(Field(SHEAR[name], nodes, scales.gap) for name, nodes in WALLS.items()),
-    Field(ROTATION, "section", lambda _: scales.ROTATION),
-    Field(AXIAL, "section", lambda _: scales.GAP),
-)
-
-
-def _segment_rule(p: Discretisation) -> Rule:
-    return film_rule(p.pressure_order, p.quadrature, p.quadrature_points)
+    def _given(self, group: Group, values: Values) -> dict[str, Values]:
+        """Values that the blocks of a group ask for, by block."""
+        return {
+            block.name: chosen(block, self.problem.assembler.block(block.name).kernel, values)
+            for block in self.blocks
+            if block.group == group
+        }
 
 
-BLOCKS = (
-    Block(SOLID, "{solid}", BODY, (), "solid"),
-    Block("sealed_side", "follower_pressure", "sealed_side", (), "load"),
-    Block("sealed_arc", "follower_pressure", "sealed_arc", (), "load"),
-    Block(ROD, "contact", "arc_nodes", (ROD,), "contact"),
-    *(
-        Block(name, kernel, WALLS[name], (name,), "contact", needed=lambda p: not p.rubs)
-        for name, kernel in zip(WALLS, ("contact", "contact", "contact{edge}"), strict=True)
-    ),
-    *(
-        Block(name, FRICTION, on, (name, SHEAR[name]), "contact", needed=lambda p: p.rubs)
-        for name, on in WALLS.items()
-    ),
-    Block(
-        *(FILM, "film{oil}", "arc", (PRESSURE,), "film"),
-        needed=lambda p: not p.conserving,
-        rule=_segment_rule,
-    ),
-    Block(
-        *(FILM, "film_{conserving}", "arc", (PRESSURE, VOID), "film"),
-        needed=lambda p: p.conserving,
-        rule=lambda p: rupture_rule(p.pressure_order),
-    ),
-    Block(
-        *("cavitation", "film_void", "film_nodes", (PRESSURE, VOID), "film"),
-        needed=lambda p: p.conserving,
-    ),
-    Block(
-        *(SQUEEZE, "film_squeeze{rough}", "arc", (PRESSURE, VOID), "squeeze"),
-        needed=lambda p: p.conserving,
-        rule=lambda p: content_rule(p.pressure_order),
-    ),
-    Block(
-        *("upwind", "film_upwind{rough}", "arc", (PRESSURE,), "film"),
-        needed=lambda p: p.upwinding != 0.0,
-        rule=_segment_rule,
-    ),
-    Block(
-        *(FACET, "film_facet", "facets", (PRESSURE,), "film"),
-        needed=lambda p: p.reynolds == "dg",
-        rule=lambda p: facet_rule(p.pressure_order),
-    ),
-    Block("rotation", "mean_rotation", "cells", (ROTATION,), "support", constant=True),
-    Block("hold", "mean_axial", "cells", (AXIAL,), "support", constant=True),
-)
-
-
-def blocks_of(p: Seal) -> tuple[Block, ...]:
-    """The blocks of a case, first the solids of its section in the order of their elements."""
-    solid, *others = BLOCKS
-    own = [replace(solid, name=f"{SOLID} {r}", elements=r, region=r) for r in p.materials]
-    body = (solid,) if p.has_body else ()
-    return (*own, *body, *(block for block in others if block.needed(p)))
-
-
-def obstacles_of(p: Gland) -> dict[str, Obstacle]:
-    """The obstacles by the names of their blocks."""
-    obstacles = (
-        inner_cylinder(ROD, 0.5 * p.rod_diameter),
-        outer_cylinder(BORE, 0.5 * p.housing_diameter),
-        plane(SEALED_WALL, p.sealed_wall, faces=1),
-        plane(AIR_WALL, p.air_wall, faces=-1),
-    )
-    return {obstacle.name: obstacle for obstacle in obstacles}
-
-
-def values_at_rest(block: Block, p: Seal, section: SealSection) -> Values | None:
-    """Parameters of a block of the unloaded contact problem; None where it is switched off."""
-    if block.group == "solid":
-        return p.rubber(block.region).rubber_values
-    if block.group == "load":
-        return {"pressure": 0.0}
-    if block.group == "contact":
-        wall = {"wall": p.air_wall, "fillet": p.corner_fillet}
-        edge = {**wall, "lip": 0.5 * p.rod_diameter + p.extrusion_gap}
-        return {"offset": 0.0, "force_weight": 1.0, "friction": p.housing_friction, **edge}
-    area, (z, r), polar_moment = section.moments
-    if block.name == "rotation":
-        centre = {"centre_z": float(z), "centre_r": float(r)}
-        return {**centre, "polar_moment": polar_moment, "angle": 0.0}
-    if block.name == "hold":
-        return {"area": area, "place": 0.0}
-    return None
-
-
-def contact_values(loads: ContactLoads) -> dict[str, Values | None]:
-    """Changes by the loads of contact, by block.
-
-    The sealed pressure also acts on the arc up to its lowest node, as the film will carry it there;
-    the rod multipliers of that part are the contact pressure in excess of it.
-    """
-    pressure = {"pressure": loads.sealed_pressure}
-    return {
-        "sealed_side": pressure,
-        "sealed_arc": pressure,
-        **{name: {"offset": offset} for name, offset in loads.offsets.items()},
-        "hold": {"place": loads.place or 0.0},
-    }
-
-
-def film_values(p: Seal, film: FilmLoads) -> Values:
-    """Parameters of the terms of the film."""
-    return {
-        "rod_radius": 0.5 * p.rod_diameter,
-        "rod_speed": film.rod_speed,
-        "viscosity": p.viscosity,
-        "pressure_viscosity": p.pressure_viscosity,
-        "cavitation_penalty": p.cavitation_penalty,
-        "force_weight": 1.0,
-        "shear_weight": film.shear,
-        "shear_modulus": p.surface_modulus,
-        "upwinding": p.upwinding * copysign(1.0, film.rod_speed),
-        "rate": film.rate,
-        **p.thinning_values(p.viscosity),
-        **p.surfaces.values(),
-        "boundary_speed": film.slip,
-        **void_values(p.cavitation_pressure),
-    }
-
-
-def contact_kernels(p: Seal) -> tuple[str, ...]:
-    """Names of the kernels that the contact problem of a case depends on, each once."""
-    kernels = [b.kernel_of(p) for b in blocks_of(p) if not b.of_film]
-    return tuple(dict.fromkeys(kernels))
+def build_system(
+    p: Seal, layout: Layout | None = None, density: Fraction | None = None
+) -> SealSystem:
+    """The system of a case on its section; see `seal_section`."""
+    return SealSystem.of(p, seal_section(p, layout, density))

@@ -14,8 +14,8 @@ from functools import cache
 
 from softehl.cases.seal.gland.grooves import INCH
 from softehl.cases.seal.gland.tables import rows
+from softehl.cases.seal.gland.trade.normalise_text import NotUnderstoodError, refused
 from softehl.cases.seal.gland.trade.ring_names import read_ring
-from softehl.cases.seal.gland.trade.text import NotUnderstoodError, refused
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from typing import Any
 from scipy.constants import zero_Celsius
 from scipy.optimize import brentq
 
-from softehl.cases.seal.gland.given import number, put
-from softehl.cases.seal.gland.records.oil import THICKEST, Oil
+from softehl.cases.seal.gland.key_values import number, put
+from softehl.cases.seal.gland.records import THICKEST, Oil
 from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.oil_names import GRADES, read_oil_name
 

@@ -8,22 +8,25 @@ from typing import Any, ClassVar, Self
 from pydantic import model_validator
 
 from softehl.cases.harness.parameters import Parameters
-from softehl.cases.seal.gland.contradictions import require_consistent
-from softehl.cases.seal.gland.fitting import fitted
+from softehl.cases.seal.gland.fit_geometry import fitted
 from softehl.cases.seal.gland.oils import with_oil
-from softehl.cases.seal.gland.records.duty import Duty
-from softehl.cases.seal.gland.records.film_model import FilmModel
-from softehl.cases.seal.gland.records.free_seal import FreeSeal, Solid
-from softehl.cases.seal.gland.records.gland import Gland
-from softehl.cases.seal.gland.records.numerics import Numerics
-from softehl.cases.seal.gland.records.oil import Oil
+from softehl.cases.seal.gland.records import (
+    Duty,
+    FilmModel,
+    FreeSeal,
+    Gland,
+    Numerics,
+    Oil,
+    Solid,
+)
 from softehl.cases.seal.gland.rubbers.regions import with_regions
 from softehl.cases.seal.gland.rubbers.rubber import with_rubber
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
-from softehl.cases.seal.gland.sections.keys import MEASURES, SectionKeys
+from softehl.cases.seal.gland.sections.section_keys import MEASURES, SectionKeys
 from softehl.cases.seal.gland.shear_thinning import ThinningKeys
 from softehl.cases.seal.gland.surfaces import SurfacePair, Surfaces
-from softehl.cases.seal.gland.trade.said import SaidKeys, with_limits
+from softehl.cases.seal.gland.trade.parse_terms import SaidKeys, with_limits
+from softehl.cases.seal.gland.validation import require_consistent
 
 
 def _own(record: type[Parameters]) -> tuple[str, ...]:

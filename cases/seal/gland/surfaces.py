@@ -13,7 +13,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from softehl.cases.harness.parameters import Parameters, key
-from softehl.cases.seal.gland.given import number
+from softehl.cases.seal.gland.key_values import number
 from softehl.cases.seal.gland.trade.finish_names import read_finish
 
 MICROMETRE = 1e-3  # mm

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 
 from softehl.cases.harness.row import Record, column
 from softehl.cases.seal.gland.catalogue import ring
-from softehl.cases.seal.gland.fitting import DIAMETERS
-from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.fit_geometry import DIAMETERS
+from softehl.cases.seal.gland.records import Gland
 from softehl.cases.seal.gland.rubbers.materials import MODULI
-from softehl.cases.seal.gland.sections.keys import MEASURES
+from softehl.cases.seal.gland.sections.section_keys import MEASURES
+from softehl.cases.seal.gland.sensitivity_keys import LENGTHS, NUMBERS, PRESSURE_KEY
+from softehl.cases.seal.gland.trade.parse_terms import LENGTHS as LIMITED
+from softehl.cases.seal.gland.trade.parse_terms import bands
 from softehl.cases.seal.gland.trade.ring_names import read_ring
-from softehl.cases.seal.gland.trade.said import LENGTHS as LIMITED
-from softehl.cases.seal.gland.trade.said import bands
-from softehl.cases.seal.gland.varied import LENGTHS, NUMBERS, PRESSURE_KEY
 
 if TYPE_CHECKING:
     from softehl.cases.seal.gland.parameters import Seal

@@ -17,8 +17,7 @@ from softehl.cases.seal.report import style
 from softehl.cases.seal.report.parts import PRESSURES, gland
 from softehl.cases.seal.report.pictures import pictures_of
 from softehl.cases.seal.report.section import View, section_figure
-from softehl.cases.seal.sensitivity.design import slope_of, value_of
-from softehl.cases.seal.sensitivity.design_command import Design
+from softehl.cases.seal.sensitivity.design import Design, slope_of, value_of
 from softehl.cases.seal.sensitivity.quantities import CALLED
 from softehl.cases.seal.states.state import FilmRow
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softehl.cases.harness.files import Cells, write_content
+from softehl.cases.harness.file_content import Cells, write_content
 from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import write_pvd
 
 if TYPE_CHECKING:
-    from softehl.cases.seal.gland.records.gland import Gland
+    from softehl.cases.seal.gland.records import Gland
 
 FILES = ("gland.vtu", "section_out.pvd", "section_in.pvd")
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite
 
-from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
 from softehl.cases.harness.responses import titled
+from softehl.cases.harness.resume import advice_of
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.tolerances import ToleranceRow, ring_sizes
 from softehl.cases.seal.gland.trade.oil_names import read_oil_name
-from softehl.cases.seal.gland.trade.said import bands
+from softehl.cases.seal.gland.trade.parse_terms import bands
 from softehl.cases.seal.report import style
-from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
-from softehl.cases.seal.report.interactive import curve_plot, film_plot, friction_plot
+from softehl.cases.seal.report.bokeh_plots import curve_plot, film_plot, friction_plot
+from softehl.cases.seal.report.gland_drawing import fit_numbers, gland_figure
 from softehl.cases.seal.report.pictures import FIGURES, pictures_of
 from softehl.cases.seal.sensitivity.quantities import CALLED
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage

@@ -15,8 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation, TriContourSet
 
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.free_seal import FreeSeal
-from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.records import FreeSeal, Gland
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.paraview import gland_lines
 from softehl.cases.seal.states.observer_adapter import read_profile, read_section

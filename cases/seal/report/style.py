@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import AutoLocator, LogLocator, NullLocator
 
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.records import Gland
 from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.arrays import Array
 

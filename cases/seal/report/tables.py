@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.rubbers.rubber_data import COLUMNS, Fit, fit, read_data
+from softehl.cases.seal.gland.rubbers.rubber_fit import COLUMNS, Fit, fit, read_data
 from softehl.cases.seal.gland.tolerances import ToleranceRow, band, read_tolerances
 from softehl.cases.seal.states.sensitivity_table import SensitivityRow
 from softehl.cases.seal.states.state import FilmRow

@@ -14,7 +14,7 @@ from math import inf, pi, radians
 import numpy as np
 
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.sections.files import finer
+from softehl.cases.seal.gland.sections.section_files import finer
 from softehl.cases.seal.meshing.outline import Shape, gentle
 from softehl.cases.seal.meshing.section_mesh import SectionMesh
 from softehl.cases.seal.meshing.section_mesher import Sizes, section_mesh

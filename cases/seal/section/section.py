@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.free_seal import Solid
+from softehl.cases.seal.gland.records import Solid
 from softehl.cases.seal.meshing.section_mesh import SectionMesh
 from softehl.cases.seal.section.layout import Layout, uniform_layout
 from softehl.runtime.arrays import Array, Integers

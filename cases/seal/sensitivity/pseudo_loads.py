@@ -133,7 +133,7 @@ class FieldRates:
         for k in range(ndof):
             along = np.zeros((n, width + ndof))
             along[:, width + k] = 1.0
-            np.add.at(gradient, part.dofs[:, k], weighted(self._rates(along, part), some))
+            np.add.at(gradient, part.dofs.T[k], weighted(self._rates(along, part), some))
         return gradient
 
     @property

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from softehl.cases.seal.equations.system import DISPLACEMENT, FACET, FILM
+from softehl.cases.seal.equations.definition import DISPLACEMENT, FACET, FILM
+from softehl.cases.seal.sensitivity.frozen_mesh_map import SPEED, FilmCase
 from softehl.cases.seal.sensitivity.pseudo_loads import FieldRates, Inputs, weighted
-from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
 from softehl.cases.seal.states.contacts import CONTACT_FILM, GROOVE, contact_film, contact_level
 from softehl.cases.seal.states.results import film_parts, metering
 from softehl.runtime.arrays import Array

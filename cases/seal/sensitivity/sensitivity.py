@@ -1,9 +1,8 @@
 """Exact sensitivities of a film: what a change of any parameter by one per cent does, in per cent.
 
 All derivatives are those of the discrete equations at the converged state, d log q / d log s. The
-mesh moves with the section (`cases.seal.sensitivity.variation`). For what a run reports it moves
-with the edges of the film, too (`cases.seal.sensitivity.following`). The film does not
-depend on the contact it began from.
+mesh moves with the section (`frozen_mesh_map`). For what a run reports it moves with the edges of
+the film, too (`moving_mesh`). The film does not depend on the contact it began from.
 
 With K = dR/dx and the load b = dR/ds of a variation, dx = -K^-1 b, and a quantity q(x, s) has
 dq/ds = q_s + q_x . dx = q_s - l . b with K^T l = q_x: one solve of the adjoint for each quantity.
@@ -17,8 +16,9 @@ from types import MappingProxyType
 import numpy as np
 from scipy.sparse import csc_array
 
-from softehl.cases.seal.gland.records.numerics import Numerics
-from softehl.cases.seal.sensitivity.following import edges, shift_rate, velocities
+from softehl.cases.seal.gland.records import Numerics
+from softehl.cases.seal.sensitivity.frozen_mesh_map import SPEED, FilmCase
+from softehl.cases.seal.sensitivity.moving_mesh import edges, shift_rate, velocities
 from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, Tangent
 from softehl.cases.seal.sensitivity.quantities import (
     Quantity,
@@ -27,9 +27,8 @@ from softehl.cases.seal.sensitivity.quantities import (
     fields_along,
     quantities,
 )
-from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
-from softehl.cases.seal.solve.films import Film
-from softehl.cases.seal.solve.method import Differentiate
+from softehl.cases.seal.solve.driver import Differentiate
+from softehl.cases.seal.solve.film_solver import Film
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear.direct import choose
 from softehl.runtime.solve.linear.linear_solver import LinearSolver, SingularMatrix, SparseMatrix

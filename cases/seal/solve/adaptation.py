@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
+from softehl.cases.seal.solve.arc_meshing import CYCLES, film_layout, misfit
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
-from softehl.cases.seal.solve.layouts import CYCLES, film_layout, misfit
-from softehl.cases.seal.solve.path import StageError
+from softehl.cases.seal.solve.film_solver import Film, FilmSolver, NoFilm
+from softehl.cases.seal.solve.load_stages import StageError
 from softehl.cases.seal.solve.transfer import FilmTransfer
 from softehl.cases.seal.states.estimate import (
     Estimate,

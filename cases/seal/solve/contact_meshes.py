@@ -21,16 +21,15 @@ from pathlib import Path
 
 import numpy as np
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.equations.system import contact_kernels
+from softehl.cases.seal.equations.definition import contact_kernels
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.numerics import Numerics
-from softehl.cases.seal.gland.records.oil import Oil
+from softehl.cases.seal.gland.records import Numerics, Oil
 from softehl.cases.seal.gland.surfaces import Surfaces
-from softehl.cases.seal.solve.contact import contact_problem, correction_stage
+from softehl.cases.seal.solve.arc_meshing import CYCLES, DENSITY, contact_layout, on_wall
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
-from softehl.cases.seal.solve.layouts import CYCLES, DENSITY, contact_layout, on_wall
-from softehl.cases.seal.solve.path import Stage, StageError
+from softehl.cases.seal.solve.contact_stages import contact_problem, correction_stage
+from softehl.cases.seal.solve.load_stages import Stage, StageError
 from softehl.cases.seal.states.contacts import unsealed
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, write_arrays

@@ -13,7 +13,7 @@ from softehl.cases.seal.correctors.layer_split import Layered
 from softehl.cases.seal.correctors.perturbed_lagrangian import LaggedPressure
 from softehl.cases.seal.correctors.proximal_term import Anchored, Relaxed
 from softehl.cases.seal.correctors.schur_corrector import SchurCorrector
-from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.problem import Problem

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
-from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import Stroke
+from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.contacts import Edge, contact_edges
 from softehl.runtime.arrays import Array

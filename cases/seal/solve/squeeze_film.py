@@ -21,9 +21,7 @@ from scipy.sparse import coo_array, csc_array
 
 from softehl.cases.seal.correctors.layer_split import Layer, Layered
 from softehl.cases.seal.correctors.proximal_term import Relaxed
-from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.equations.loads import FilmLoads, Stroke
-from softehl.cases.seal.equations.system import (
+from softehl.cases.seal.equations.definition import (
     AIR_WALL,
     DISPLACEMENT,
     MOVED,
@@ -31,9 +29,11 @@ from softehl.cases.seal.equations.system import (
     SEALED_WALL,
     WALLS,
 )
-from softehl.cases.seal.solve.contact import OFFSET, held_moment, held_place
+from softehl.cases.seal.equations.loads import FilmLoads, Stroke
+from softehl.cases.seal.equations.system import SealSystem
+from softehl.cases.seal.solve.arc_meshing import NO_WIDTH
+from softehl.cases.seal.solve.contact_stages import OFFSET, held_moment, held_place
 from softehl.cases.seal.solve.inlet import InletScales
-from softehl.cases.seal.solve.layouts import NO_WIDTH
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.quadrature import content_rule, pressure_nodes
 

@@ -1,10 +1,9 @@
 """Contact and film of one mesh of a section on another one: the start of their solution there.
 
 Displacements, multipliers and element pressures of a contact are carried over and corrected by
-Newton's method, which holds on to the pressures in its tangent
-(`cases.seal.correctors.perturbed_lagrangian`).
+Newton's method, which holds on to the pressures in its tangent (`correctors.perturbed_lagrangian`).
 The multipliers are unknowns, so contact is stiff from the first iteration on. The equations are
-those of a path (`cases.seal.solve.path`); only the start is another one.
+those of a path (`cases.seal.solve.load_stages`); only the start is another one.
 
 The contact of a film is known on both meshes. The change from contact to film is carried: it is
 small and smooth where the state itself is not, as in the corners of a groove. A gap of a micrometre
@@ -20,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.meshing.mesh_morphing import potential
 from softehl.cases.seal.meshing.mesh_transfer import (
     transfer_boundary,
@@ -28,9 +27,9 @@ from softehl.cases.seal.meshing.mesh_transfer import (
     transfer_elements,
     transfer_nodes,
 )
-from softehl.cases.seal.solve.contact import contact_problem, correction_stage
+from softehl.cases.seal.solve.contact_stages import contact_problem, correction_stage
 from softehl.cases.seal.solve.correctors import lagged
-from softehl.cases.seal.solve.path import Stage
+from softehl.cases.seal.solve.load_stages import Stage
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.discretisation.quadrature import lagrange, pressure_nodes
 

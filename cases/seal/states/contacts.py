@@ -8,8 +8,8 @@ from math import pi
 
 import numpy as np
 
-from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.equations.system import AIR_WALL, BORE, ROD, SEALED_WALL, WALLS
+from softehl.cases.seal.equations.definition import AIR_WALL, BORE, ROD, SEALED_WALL, WALLS
+from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.gland.surfaces import MICROMETRE
 from softehl.cases.seal.meshing.outline_checks import crossing
 from softehl.cases.seal.states.section_view import section_view

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.definition import FACET, FILM
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
-from softehl.cases.seal.equations.system import FACET, FILM
+from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.gland.surfaces import MICROMETRE, regime
 from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film, contact_level, groups
-from softehl.cases.seal.states.film_signs import (
+from softehl.cases.seal.states.mesh_indicators import (
     INLET,
     THIN,
     built_up,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.states.state import Section
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.contact.rigid_obstacles import tributary_areas

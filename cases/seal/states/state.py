@@ -9,7 +9,7 @@ from math import nan
 from typing import Any, Protocol, Unpack
 
 from softehl.cases.harness import observer as harness
-from softehl.cases.harness.files import Cells
+from softehl.cases.harness.file_content import Cells
 from softehl.cases.harness.row import OK, Row, column
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import number_text

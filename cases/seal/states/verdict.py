@@ -104,7 +104,7 @@ class FilmNumbers:
     """Scalars of a film: mm, MPa, N, s; flux per circumference in mm^2/s, signed like U.
 
     flux_variation: relative, outside cavitation. jump: largest of the pressure at a facet, MPa.
-    oscillation: index of `cases.seal.states.film_signs.oscillation`. inlet_segments: number of
+    oscillation: index of `cases.seal.states.mesh_indicators.oscillation`. inlet_segments: number of
     segments over which the film narrows from ten times to one and a half times h* at its inlet.
     inlet_ratio: h* over that of the steepest slope of the pressure in the inlet, by (14) at h = 3/2
     h*. end_gap: the film thickness at the exit end of the arc. entrance: pressure that oil has

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from softehl.cases.seal.gland.given import number, one_line
+from softehl.cases.seal.gland.key_values import number, one_line
 from softehl.cases.seal.gland.rubbers.rubber import with_rubber
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.trade.rubber_names import is_plastic

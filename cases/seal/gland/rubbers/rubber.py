@@ -10,12 +10,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from softehl.cases.seal.gland.given import number, put, shown
+from softehl.cases.seal.gland.key_values import number, put, shown
 from softehl.cases.seal.gland.rubbers.hardness import shore_range, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import KEYS, MATERIALS, Material, shear_modulus
-from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
+from softehl.cases.seal.gland.rubbers.rubber_fit import fit, read_data
+from softehl.cases.seal.gland.trade.normalise_text import refused
 from softehl.cases.seal.gland.trade.rubber_names import read_rubber
-from softehl.cases.seal.gland.trade.text import refused
 
 PAPER = {"mu_1": 3.04, "mu_2": 0.62}
 """Moduli of Table 1 of the paper, MPa."""

@@ -7,11 +7,11 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from softehl.cases.harness.parameters import Number, Parameters, key
-from softehl.cases.seal.gland.given import shown
+from softehl.cases.seal.gland.key_values import shown
 from softehl.cases.seal.gland.rubbers import materials
 from softehl.cases.seal.gland.rubbers.rubber import PAPER
+from softehl.cases.seal.gland.trade.parse_terms import rubber_named
 from softehl.cases.seal.gland.trade.rubber_names import read_rubber
-from softehl.cases.seal.gland.trade.said import rubber_named
 
 Terms = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3, strict=False)]
 

@@ -6,7 +6,7 @@ import re
 from math import pi, sqrt
 
 from softehl.cases.harness.units import read_quantity
-from softehl.cases.seal.gland.trade.text import NUMBER, form, plain, refused
+from softehl.cases.seal.gland.trade.normalise_text import NUMBER, form, plain, refused
 
 RMS_OF_RA = sqrt(0.5 * pi)
 """Rms height over mean height (Ra) of a surface whose heights have a normal distribution."""

@@ -10,7 +10,7 @@ from bisect import bisect_left
 from dataclasses import dataclass
 
 from softehl.cases.seal.gland.tables import rows
-from softehl.cases.seal.gland.trade.text import NUMBER, number_text, plain, refused
+from softehl.cases.seal.gland.trade.normalise_text import NUMBER, number_text, plain, refused
 
 _TABLE = rows("iso286.csv")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from softehl.cases.harness.units import read_quantity
 from softehl.cases.seal.gland.tables import rows
-from softehl.cases.seal.gland.trade.text import NUMBER, form, plain, refused
+from softehl.cases.seal.gland.trade.normalise_text import NUMBER, form, plain, refused
 
 IMPROVED = 140.0
 """Least viscosity index of HVLP oils, DIN 51524-3."""

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from softehl.cases.seal.gland.trade.text import NUMBER, form, plain, refused
+from softehl.cases.seal.gland.trade.normalise_text import NUMBER, form, plain, refused
 
 Kind = Literal["round", "x_ring", "u_cup"]
 

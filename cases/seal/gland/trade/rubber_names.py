@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass
 
 from softehl.cases.seal.gland.tables import rows
-from softehl.cases.seal.gland.trade.text import NUMBER, form, number_text, plain, refused
+from softehl.cases.seal.gland.trade.normalise_text import NUMBER, form, number_text, plain, refused
 
 _TABLE = rows("polymers.csv")
 

@@ -1,0 +1,223 @@
+"""Geometry of the fit: ring, rod, gland, depth and fill from the names of catalogues.
+
+A ring gives two diameters; the rod, and either the depth, the squeeze, the housing or a standard
+gland the rest. Values that are given twice must agree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from softehl.cases.seal.gland import catalogue
+from softehl.cases.seal.gland.grooves import KINDS, Groove, cup_gland, gland
+from softehl.cases.seal.gland.key_values import agree, number, put, shown
+from softehl.cases.seal.gland.records import OF_PISTON, FreeSeal, Gland
+from softehl.cases.seal.gland.sections.section_keys import section_of_file
+from softehl.cases.seal.gland.sections.shapes import UCup, parts_of
+from softehl.cases.seal.gland.trade.parse_terms import bands, texts
+from softehl.cases.seal.gland.trade.ring_names import read_ring
+
+DIAMETERS = {"rod": "rod_diameter", **{name: key for key, name in OF_PISTON.items()}}
+"""Key of a diameter as it is measured -> key that is negative in a piston."""
+
+_GROUND = ("groove_diameter", "squeeze", "groove_depth")
+"""Keys that housing_diameter follows from, in the order in which they are read."""
+
+
+def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a case with those that follow from ring, rod, squeeze and gland filled in.
+
+    Raises ValueError where something is missing or contradicts; values of wrong types pass, to be
+    refused with their keys.
+    """
+    values = dict(given)
+    _with_outline(values)
+    if isinstance(values.get("ring"), int):
+        values["ring"] = str(values["ring"])  # "-226" is a number to a reader of TOML
+    side, ground = _side(values), values.get("housing_diameter")
+    if side < 0.0 and number(ground) and ground > 0.0:
+        values["housing_diameter"] = -float(ground)
+    for name, key in DIAMETERS.items():
+        if number(values.get(name)):
+            _follow(values, key, side * float(values[name]), name)
+    if isinstance(values.get("ring"), str):
+        _with_ring(values)
+    if side < 0.0:
+        _in_piston(values)
+    _with_gland(values)
+    return values
+
+
+def _with_outline(values: dict[str, Any]) -> None:
+    """The height of an outline that is given."""
+    if isinstance(values.get("outline"), str):
+        inner = _size(values, "inner_diameter")
+        if not number(inner) or inner == 0.0:
+            return  # refused with its key
+        shape, _ = section_of_file(Path(values["outline"]), float(inner))
+        _, low, _, high = shape.outline.box
+        put(values, "section_diameter", high - low, f"outline = {values['outline']}")
+
+
+def _size(values: Mapping[str, Any], key: str) -> Any:
+    """The value of a key of the gland, its default where none is given."""
+    return values.get(key, Gland.model_fields[key].default)
+
+
+def _side(values: Mapping[str, Any]) -> float:
+    """-1 of a piston seal, whose diameters are counted negative, else 1."""
+    if values.get("bore") is None:
+        rod = values.get("rod_diameter")
+        return -1.0 if number(rod) and rod < 0.0 else 1.0
+    if values.get("rod") is not None:
+        raise ValueError(
+            f"rod = {values['rod']} and bore = {values['bore']}: a seal slides on one of them; a "
+            "rod seal has a rod, a piston seal a bore"
+        )
+    return -1.0
+
+
+def _in_piston(values: dict[str, Any]) -> None:
+    """The inner diameter of a piston seal as less its outside one, and its usual gland.
+
+    Without one the ring is just as large as the bore outside.
+    """
+    bore, inner = values.get("rod_diameter"), values.get("inner_diameter")
+    section = _size(values, "section_diameter")
+    if number(inner) and inner > 0.0 and number(section):
+        values["inner_diameter"] = -(inner + 2.0 * section)
+    if inner is None and not values.get("ring") and number(bore):
+        values["inner_diameter"] = float(bore)
+    if values.get("bore") is not None and not values.get("ring"):
+        _with_usual_gland(values)
+
+
+def _with_ring(values: dict[str, Any]) -> None:
+    said = read_ring(values["ring"])
+    if said.kind not in (None, "round"):
+        section = values.setdefault("section", said.kind)
+        if section != said.kind:
+            raise ValueError(
+                f'section = "{section}" and ring = "{values["ring"]}" contradict: leave one out'
+            )
+    if said.outer is not None:
+        ends = said.inner, said.outer
+        rod, ground = ends if _side(values) > 0.0 else (-ends[1], -ends[0])
+        if said.bore_first and rod > 0.0:
+            raise ValueError(
+                f'ring = "{values["ring"]}" names a piston seal, its bore first; give '
+                f'bore = {said.outer:g}, or write "U-cup {said.inner:g}x{said.outer:g}x'
+                f'{said.width:g}" for a rod seal'
+            )
+        _with_cup(values, rod, ground, said.width or 0.0)
+        return
+    ring = catalogue.ring(values["ring"])
+    if values.get("rod_diameter") is None:
+        rod, bore = round(1.02 * ring.inner_diameter, 1), round(ring.outer_diameter, 1)
+        raise ValueError(
+            f'ring = "{values["ring"]}" needs the rod that it seals, as in rod = {rod:g}, '
+            f"or the bore of a piston seal, as in bore = {bore:g}"
+        )
+    before, inner = values.get("inner_diameter"), ring.inner_diameter
+    if _side(values) < 0.0 and not (number(before) and before > 0.0):
+        inner = -ring.outer_diameter
+    _follow(values, "inner_diameter", inner, "ring")
+    _follow(values, "section_diameter", ring.section_diameter, "ring")
+    _with_usual_gland(values)
+
+
+def _with_usual_gland(values: dict[str, Any]) -> None:
+    """A standard gland where depth or width are not given."""
+    depths = ("housing_diameter", "groove_diameter", "squeeze", "gland", "groove_depth")
+    widths = ("groove_width", "fill")
+    if not any(map(values.get, depths)) or not any(map(values.get, widths)):
+        values["gland"] = values.get("gland") or "dynamic"
+
+
+def _with_cup(values: dict[str, Any], rod: float, groove: float, width: float) -> None:
+    """A U-cup by its groove: the height over its free lips is such that its gland has this depth.
+
+    The lips are squeezed alike on the rod and in the housing.
+    """
+    values.setdefault("rod_diameter", rod)
+    values.setdefault("housing_diameter", groove)
+    values.setdefault("groove_width", width)
+    depth, heel = 0.5 * (groove - rod), parts_of(UCup)["heel_height"]
+    height = values.setdefault("section_diameter", round(depth / (0.5 * (1.0 + heel)), 3))
+    if number(height):
+        values.setdefault("inner_diameter", rod - (height - depth))
+        _require_rod_of_cup(values, rod, groove, width)
+
+
+def _require_rod_of_cup(values: Mapping[str, Any], rod: float, groove: float, width: float) -> None:
+    """ValueError for a U-cup that is named by another rod, or bore, than the one that is given."""
+    given, ground = values["rod_diameter"], values["housing_diameter"]
+    section = values["section_diameter"]
+    if not (number(given) and number(ground)) or 0.98 <= given / rod <= 1.02:
+        return
+    if 0.5 * section < 0.5 * (ground - given) < section and -0.1 <= given / rod - 1.0 <= 0.2:
+        return
+    what, size, depth = "rod" if rod > 0.0 else "bore", abs(given), round(groove - rod, 4)
+    near = round(size)
+    ends = (near, near + depth) if rod > 0.0 else (near - depth, near)
+    raise ValueError(
+        f'ring = "{values["ring"]}" is a U-cup for a {what} of {abs(rod):g} mm, not of '
+        f"{shown(float(size))}; give {what} = {abs(rod):g}, or a U-cup for this {what}, as in "
+        f'"U-cup {ends[0]:g}x{ends[1]:g}x{width:g}"'
+    )
+
+
+def _with_gland(values: dict[str, Any]) -> None:
+    """Ground and width of the groove by squeeze, depth, a standard gland and fill."""
+    section, rod = _size(values, "section_diameter"), _size(values, "rod_diameter")
+    if not (number(section) and number(rod)):
+        return
+    if number(values.get("squeeze")):
+        depth = section * (1.0 - values["squeeze"] / 100.0)
+        _follow(values, "housing_diameter", rod + 2.0 * depth, "squeeze")
+    if number(values.get("groove_depth")):
+        _follow(values, "housing_diameter", rod + 2.0 * values["groove_depth"], "groove_depth")
+    if values.get("gland") in KINDS:
+        groove = _groove(values, section)
+        if values.get("housing_diameter") is None:
+            said = texts(values.get("said"))
+            limits = {name: found for name, _, found in bands(said, piston=rod < 0.0)}
+            named = limits.get("bore" if rod < 0.0 else "rod")
+            of_chart = math.copysign(named.nominal, rod) if named else rod
+            values["housing_diameter"] = round(of_chart + 2.0 * groove.depth, 4)
+        if values.get("groove_width") is None and values.get("fill") is None:
+            values["groove_width"] = round(groove.width, 4)
+    if number(fill := values.get("fill")) and fill > 0.0:
+        free = FreeSeal(**{k: values[k] for k in FreeSeal.model_fields if k in values})
+        around = 0.25 * math.pi * (_size(values, "housing_diameter") ** 2 - rod**2)
+        width = 100.0 * free.volume / (around * fill)
+        _follow(values, "groove_width", width, "fill")
+
+
+def _groove(values: Mapping[str, Any], section: float) -> Groove:
+    """The standard gland of a section."""
+    if values.get("section") != "u_cup":
+        return gland(section, values["gland"], values.get("section", "round"))
+    parts = parts_of(UCup)
+    heel = values.get("heel_height") or parts["heel_height"] * section
+    return cup_gland(section, heel, values.get("section_width") or parts["width"] * section)
+
+
+def _follow(values: dict[str, Any], key: str, value: float, source: str) -> None:
+    """A length that follows from another key, set or seen to agree.  ValueError names both."""
+    if values.get(key) is None:
+        values[key] = value
+    before, latter = values[key], f"{source} = {values[source]}"
+    if not number(before) or agree(before, value):
+        return  # what is no number is refused with its key
+    earlier = _GROUND[: _GROUND.index(source)] if source in _GROUND else ()
+    former = next((name for name in earlier if number(values.get(name))), None)
+    was, new = shown(abs(before)), shown(abs(value))
+    words = f"{key} = {was} and {latter} contradict: the latter gives {new}"
+    if former:
+        given = f"{former} = {shown(values[former])}"
+        words = f"{given} and {latter} contradict: they give diameters of {was} and {new}"
+    raise ValueError(f"{words} mm; leave one of them out")

@@ -1,0 +1,79 @@
+"""Values of keys: type checks, agreement of values that are given twice, messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import isclose
+from sys import float_info
+from typing import Any, TypeGuard
+
+from pydantic import ValidationError
+
+
+def number(value: object) -> TypeGuard[float]:
+    """True if a value is a finite number; True and False are none."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return abs(value) <= float_info.max
+
+
+def put(values: dict[str, Any], key: str, value: Any, source: str, within: float = 1e-6) -> None:
+    """Set a key, or see that what was given agrees.
+
+    source: what it follows from, in words. within: as in `agree`. Raises ValueError for a
+    contradiction.
+    """
+    before = values.get(key)
+    if before is None:
+        values[key] = value
+    elif not agree(before, value, within):
+        raise ValueError(
+            f"{key} = {shown(before)} and {source} contradict: the latter gives {shown(value)}; "
+            "leave one of them out"
+        )
+
+
+def agree(before: object, value: object, within: float = 1e-6) -> bool:
+    """True if what was given, a number or several, is what follows, or has yet to be refused.
+
+    A value of another type is refused with its key. within: relative difference that agrees,
+    usually less than tables and units round.
+    """
+    given, expected = _numbers(before), _numbers(value)
+    if not given or not all(map(number, given)):
+        return True
+    return len(given) == len(expected) and all(
+        isclose(a, b, rel_tol=within, abs_tol=1e-12) for a, b in zip(given, expected, strict=True)
+    )
+
+
+@contextmanager
+def one_line(where: str, **also: str) -> Iterator[None]:
+    """The first complaint about a record, its key behind `where`.  Raises ValueError.
+
+    also: key -> what its complaint ends with.
+    """
+    try:
+        yield
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        key, words = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        at = f"{where}{key}".rstrip(" .:")
+        raise ValueError(f"{at}: {words[0].lower()}{words[1:]}{also.get(key, '')}") from None
+
+
+def shown(value: object) -> str:
+    """A number, or several, in words."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(shown, value))}]"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def times(value: Any, factor: float) -> Any:
+    """A number, or each of several, times a factor."""
+    return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
+
+
+def _numbers(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, list | tuple) else [value]

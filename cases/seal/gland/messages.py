@@ -1,0 +1,237 @@
+"""Messages about a seal before it is run: terms as parsed, assumed values, warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Any
+
+from softehl.cases.seal.gland.grooves import gland
+from softehl.cases.seal.gland.key_values import shown
+from softehl.cases.seal.gland.oils import DENSITY
+from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records import Gland
+from softehl.cases.seal.gland.rubbers import materials
+from softehl.cases.seal.gland.rubbers.hardness import shore_band
+from softehl.cases.seal.gland.sections.section_keys import ROUND, dimensions
+from softehl.cases.seal.gland.trade.oil_names import IMPROVED, POUR, read_oil_name
+from softehl.cases.seal.gland.trade.parse_terms import understood
+from softehl.cases.seal.gland.trade.ring_names import read_ring
+from softehl.cases.seal.gland.trade.rubber_names import GLASS, RANGES
+
+
+def foreword(p: Seal, pressure: float) -> list[str]:
+    """Words of the trade as they were understood, and the ratio of pressure to modulus.
+
+    The latter is left out without a pressure, and where `warnings` has it: beyond what is known to
+    run. pressure: the largest sealed pressure, MPa.
+    """
+    load, beyond = _load(p, pressure)
+    return [*understood(p.said, piston=p.piston), *([] if beyond or not pressure else [load])]
+
+
+def warnings(p: Seal, pressure: float) -> list[str]:
+    """A pressure above what is known to run, keys without effect, what is unusual, a line each."""
+    load, beyond = _load(p, pressure)
+    words = "the run may take minutes and end without a film; a harder rubber or a lower pressure"
+    first = [f"{load}; {words} helps"] if beyond else []
+    return [*first, *_unused(p), *_unusual(p), *handbook(p)]
+
+
+def _load(p: Seal, pressure: float) -> tuple[str, bool]:
+    """The ratio of pressure to modulus in words, and whether it is above what is known to run."""
+    found = p.load_ratio(pressure)
+    if p.round:
+        most = 3.0
+        sample = (
+            "in a sample of O-rings all films were found at ratios to 4, nine of ten at 4 to 5; "
+            "above 5 states are uncertain, and nothing was tried above 5.4"
+        )
+    else:
+        most = 2.0
+        sample = (
+            "in a sample of sections other than round all films were found at ratios to 2, "
+            "four of five at 2 to 4, half of them at 4 to 5; nothing was tried above 4.9"
+        )
+    words = f"sealed pressure / shear modulus = {found:.2g}: {sample} (docs/limits.md)"
+    return words, found > most
+
+
+# --- warnings -----------------------------------------------------------------------------------
+
+_NEEDS: Mapping[str, tuple[Callable[[Seal], Any], str]] = {
+    "temperature": (lambda p: p.oil or p.fit, "an oil or a fit"),
+    "ogden_terms": (lambda p: p.fit, "a fit"),
+    "corner_fillet": (lambda p: p.opens, "an extrusion_gap"),
+    "cavitation_penalty": (lambda p: not p.conserving, 'cavitation = "penalty"'),
+    "asperity_stiffness": (lambda p: p.rough, "a roughness"),
+    "boundary_friction": (lambda p: p.rough, "a roughness"),
+}
+"""Key -> whether it has an effect, and what it has none without."""
+
+
+ALPHAS = 1e-3, 0.06
+"""Pressure-viscosity coefficients beyond which no fluid is usual, 1/MPa."""
+SWOLLEN = ("EPDM", "IIR", "SBR", "NR")
+"""Polymers that are not resistant to mineral oil."""
+FASTEST = 15_000.0
+"""Largest speed in catalogues of reciprocating seals (filled PTFE), mm/s."""
+
+
+def _unused(p: Seal) -> Iterator[str]:
+    """Keys with a value of their own that change nothing: another one is missing."""
+    for key, (used, needed) in _NEEDS.items():
+        value = getattr(p, key)
+        if value != type(p).model_fields[key].default and not used(p):
+            yield f"{key} = {shown(value)} has no effect without {needed}"
+
+
+def _unusual(p: Seal) -> Iterator[str]:
+    """Its compressibility, and a temperature outside the range of its polymer."""
+    stiffness = p.bulk_modulus / p.shear_modulus
+    if stiffness < 20.0:  # Poisson's ratio 0.475
+        yield (
+            f"bulk_modulus = {p.bulk_modulus:g} MPa is {stiffness:.3g} shear moduli: "
+            "rubbers have hundreds to thousands"
+        )
+    alpha = p.pressure_viscosity
+    if alpha and not ALPHAS[0] <= alpha <= ALPHAS[1]:
+        yield (
+            f"pressure_viscosity = {alpha:g} 1/MPa: oils have 0.01 to 0.04, water-glycols about "
+            "0.003 (1e-8 1/Pa is 0.01 1/MPa)"
+        )
+    if p.polymer in SWOLLEN and p.oil and read_oil_name(p.oil).grade:
+        yield f"{p.polymer} swells in mineral oil, and its modulus falls; {p.oil} is one"
+    if "speeds" in type(p).model_fields and max(p.speeds) > FASTEST:
+        yield (
+            f"a speed of {max(p.speeds):g} mm/s: reciprocating seals are used to {FASTEST:g} mm/s, "
+            "and the heat of the film is left out"
+        )
+    yield from _cold(p)
+    used = RANGES[p.polymer] if p.polymer else None
+    if used and p.temperature is not None and not used[0] <= p.temperature <= used[1]:
+        yield (
+            f"temperature = {p.temperature:g} degC: {p.polymer} is used from {used[0]:g} to "
+            f"{used[1]:g} degC"
+        )
+
+
+def _cold(p: Seal) -> Iterator[str]:
+    """A rubber by its hardness and an oil that are colder than what is known of them."""
+    heat = p.temperature
+    if heat is None:
+        return
+    if p.shore_A is not None and heat < 0.0:
+        near = f", the more the nearer to {GLASS[p.polymer]:g} degC" if p.polymer in GLASS else ""
+        yield (
+            f"temperature = {heat:g} degC: the modulus is that of a hardness at room temperature; "
+            f"rubber is stiffer in the cold{near}; give mu at this temperature, or tests (fit)"
+        )
+    if p.oil is None:
+        return
+    name = read_oil_name(p.oil)
+    if name.points and heat < min(0.0, *(at for _, at in name.points)):
+        yield (
+            f"temperature = {heat:g} degC is below both viscosities of the oil: it is "
+            "extrapolated, and below its pour point the oil does not flow (see its data sheet)"
+        )
+    improved = name.index is not None and name.index >= IMPROVED
+    pour = POUR.get((name.grade or 0, improved))
+    if pour is not None and heat < pour:
+        yield (
+            f"temperature = {heat:g} degC: the pour point of {p.oil} may be as high as {pour:g} "
+            "degC (DIN 51524); below its pour point an oil does not flow (see its data sheet)"
+        )
+
+
+def handbook(p: Gland) -> Iterator[str]:
+    """Warnings of handbooks about a ring and its gland."""
+    if not 60.0 <= p.fill_percent <= 95.0:
+        yield f"the ring fills {p.fill_percent:.0f} % of its gland; handbooks advise 60 to 95 %"
+    if p.stretch_percent > 5.0:
+        yield (
+            f"the ring is stretched by {p.stretch_percent:.1f} % on its "
+            f"{'piston' if p.piston else 'rod'}; handbooks advise at most 5 %"
+        )
+
+
+# --- values assumed where keys were not given ---------------------------------------------------
+
+
+def assumed(p: Seal, given: Collection[str]) -> list[str]:
+    """Important values that were not given.  given: the keys that were."""
+    said = frozenset(given)
+    return [*_ring(p, said), *_gland(p, said), *_fluids(p, said)]
+
+
+def _ring(p: Seal, said: frozenset[str]) -> Iterator[str]:
+    """Ring and rubber."""
+    if not said & {"ring", "section_diameter", "outline"}:
+        yield f"a section of {p.section_diameter:g} mm"
+    if p.section != ROUND and not said & set(dimensions(p.section)):
+        yield f"the usual proportions of section {p.section}"
+    if not said & {"ring", "inner_diameter"}:
+        yield f"inner diameter {p.ring_diameter:g} mm"
+    if p.shore_A is not None:
+        low, high = shore_band(p.shore_A, p.polymer)
+        yield (
+            f"a shear modulus of {p.shear_modulus:.3g} MPa by hardness, known to {low:+.0f} and "
+            f"{high:+.0f} %"
+        )
+        if p.temperature is not None:
+            yield f"its modulus at room temperature, not at {p.temperature:g} degC"
+    elif p.energy == "mooney_rivlin" and len(unsaid := {"mu_1", "mu_2"} - said) == 1:
+        (name,) = unsaid
+        yield f"{name} = {getattr(p, name):g} MPa"
+    elif not said & {"fit", "shore_A", *materials.KEYS}:
+        yield f"a rubber of shear modulus {p.shear_modulus:.3g} MPa"
+
+
+def _gland(p: Gland, said: frozenset[str]) -> Iterator[str]:
+    """Rod and groove."""
+    if p.ring and read_ring(p.ring).outer is not None:
+        said |= {"rod", "housing_diameter", "groove_width"}  # a U-cup is named by its groove
+    if not said & {"rod", "rod_diameter", "bore"}:
+        yield f"a rod of {p.rod_diameter:g} mm"
+    kind, charted = _kind(p)
+    decided = {
+        "housing_diameter": {"squeeze", "groove_depth", "gland", "groove_diameter"},
+        "groove_width": {"fill", "gland"},
+    }
+    if not charted:  # assumed even if the gland was asked for by name
+        decided = {key: set() for key in decided}
+    if unsaid := [key for key, others in decided.items() if not said & {key, *others}]:
+        words = (f"{p.called(key)} = {abs(getattr(p, key)):g} mm" for key in unsaid)
+        yield f"{kind} ({', '.join(words)})"
+    if not said & {"backup", "extrusion_gap"}:
+        yield "a back-up ring"
+
+
+def _kind(p: Gland) -> tuple[str, bool]:
+    """A gland in words, and whether it is one of a chart or was given."""
+    if not p.gland:
+        return "a gland", True
+    if p.section == "u_cup":
+        return "the gland of a U-cup by rule, its ground half way between heel and lips", False
+    if p.section not in (ROUND, "x_ring") or p.outline:
+        return f"the gland of an O-ring, as none is known for this {p.named}", False
+    if gland(p.section_diameter, p.gland, p.section).by_rule:
+        return "a gland in proportions between those of the neighbouring sections", False
+    return "its standard gland", True
+
+
+def _fluids(p: Seal, said: frozenset[str]) -> Iterator[str]:
+    """Pressure and oil."""
+    if "sealed_pressure" not in said:
+        yield f"a sealed pressure of {p.sealed_pressure:g} MPa"
+    if not said & {"viscosity", "oil"}:
+        yield f"an oil of {1e9 * p.viscosity:.3g} mPa s"
+    if p.oil is not None and read_oil_name(p.oil).points:
+        words = [] if "oil_density" in said else [f"the density {DENSITY:g} kg/m3 at 15 degC"]
+        if not said & {"pressure_viscosity", "roelands"}:
+            words.append(f"the pressure-viscosity coefficient {p.pressure_viscosity:.3g} 1/MPa")
+        if words:
+            yield f"{' and '.join(words)}, of a mineral oil"
+    elif "viscosity" in said and not said & {"pressure_viscosity", "roelands"}:
+        yield f"a pressure-viscosity coefficient of {p.pressure_viscosity:g} 1/MPa"
+    if p.oil and read_oil_name(p.oil).improved:
+        yield f"a viscosity index of {IMPROVED:g}, the least that HVLP oils have (DIN 51524-3)"

@@ -1,1 +1,0 @@
-"""Records of a seal: groups of keys, with the values that follow from them alone."""

@@ -1,0 +1,138 @@
+"""Summary of a run: leakage and friction in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from softehl.cases.harness.case import Alarm
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.gland.surfaces import MIXED
+from softehl.cases.seal.states.leakage import LeakageRow, net_leakage, per_100_m
+from softehl.cases.seal.states.run_plan import USUAL
+from softehl.cases.seal.states.state import FilmRow
+from softehl.cases.seal.states.verdict import LARGEST_ERROR
+
+RETURNS = "returns what it takes out"
+
+
+@dataclass(frozen=True)
+class _Speed:
+    """A sealed pressure and a speed |U|: its strokes, and their cycle where it has both."""
+
+    sealed_pressure: float
+    speed: float
+    strokes: Mapping[str, FilmRow]
+    net: LeakageRow | None
+
+    @property
+    def kind(self) -> str:
+        """Leakage in words: "leaks", "returns", or "even" where both are the same within errors."""
+        if self.net is None:
+            return ""
+        if abs(self.net.net_film_um) <= 0.01 * LARGEST_ERROR * self.strokes["out"].h_star_um:
+            return "even"
+        return "leaks" if self.net.net_mm3_per_mm > 0.0 else "returns"
+
+
+def answer(rows: Sequence[FilmRow], travel: float, stroke: str = "both") -> list[str]:
+    """Answer if the seal leaks, and a line for each sealed pressure and speed |U|, fast ones first.
+
+    travel: way of the rod from end to end, mm. stroke: what was asked for. A line with a film that
+    is thinner than the roughness is an Alarm.
+    """
+    if not rows:
+        return []
+    nets = {(net.sealed_pressure_MPa, net.speed_mm_s): net for net in net_leakage(rows)}
+    strokes = dict[tuple[float, float], dict[str, FilmRow]]()
+    for row in sorted(rows, key=lambda row: row.order):
+        at = row.sealed_pressure_MPa, abs(row.rod_speed_mm_s)
+        strokes.setdefault(at, {})[row.stroke] = row
+    places = sorted(strokes, key=lambda at: (at[0], -at[1]))
+    speeds = [_Speed(*at, strokes[at], nets.get(at)) for at in places]
+    first = _whether(speeds, travel)
+    if stroke != "both" and not nets:
+        first = f'{stroke}stroke alone, as asked for; leakage needs stroke = "both"'
+    return [first, *(_line(speed, travel, stroke) for speed in speeds)]
+
+
+def leaks(volume: float) -> str:
+    """Words for a leaking or a returning seal; volume: net, mm3 in a cycle, + = to the air side."""
+    return f"leaks {volume:.3g} mm3" if volume > 0.0 else RETURNS
+
+
+def far(volume: float, travel: float) -> str:
+    """The net volume of a cycle (mm3) as that of 100 m, in words."""
+    return f"{1e-3 * per_100_m(volume, travel):.3g} cm3 in 100 m of travel"
+
+
+def _whether(speeds: Sequence[_Speed], travel: float) -> str:
+    """One line: leaks, how much and where most, or returns what it takes out."""
+    kinds = [speed.kind for speed in speeds if speed.kind]
+    if not kinds:
+        return "leakage is not known: no speed has a film of both strokes"
+    cycle = f"in a cycle of {travel:g} mm out and back"
+    leaking = [(s.net.net_mm3_per_mm, s) for s in speeds if s.net and s.kind == "leaks"]
+    if not leaking:
+        even = set(kinds) == {"even"}
+        return f"{'takes back as much as it takes out' if even else RETURNS} {cycle}"
+    rate, most = max(leaking, key=lambda item: item[0])
+    volume = f"{travel * rate:.3g} mm3 {cycle}"
+    if len(kinds) == 1:
+        return f"leaks {volume}"
+    several = len({speed.sealed_pressure for speed in speeds}) > 1
+    at = f"{most.sealed_pressure:g} MPa and " * several + f"{most.speed:g} mm/s"
+    tight = len(kinds) - len(leaking)
+    return f"leaks, most at {at}: {volume}" + (f"; not at {tight} of {len(kinds)}" if tight else "")
+
+
+def _line(speed: _Speed, travel: float, stroke: str) -> str:
+    """A speed: leakage, friction, least lambda."""
+    strokes = speed.strokes
+    forces = [f"{abs(row.rod_friction_N):.3g} N {stroke}" for stroke, row in strokes.items()]
+    parts = [f"friction {', '.join(forces)}", *_ratio(strokes)]
+    if speed.net is not None or stroke == "both":
+        parts.insert(0, _leakage(speed, travel))
+    doubts = [f"{stroke} {row.verdict}" for stroke, row in strokes.items() if row.verdict != OK]
+    doubt = f" ({', '.join(doubts)})" if doubts else ""
+    line, thin = f"  {speed.speed:g} mm/s: {'; '.join(parts)}{doubt}", _thin(strokes)
+    return Alarm(f"{line}; {thin}") if thin else line
+
+
+def _leakage(speed: _Speed, travel: float) -> str:
+    net, kind = speed.net, speed.kind
+    if net is None:
+        return "leakage needs both strokes"
+    out, back = (
+        travel * abs(rate) / net.speed_mm_s for rate in (net.leak_out_mm3_s, net.leak_in_mm3_s)
+    )
+    both = f"takes out {out:.3g} mm3, could take back {back:.3g}"
+    if kind == "even":
+        return f"out and back the same within {LARGEST_ERROR:g} %: no net leakage ({both})"
+    if kind == "returns":
+        return f"{RETURNS} ({both})"
+    volume = travel * net.net_mm3_per_mm
+    return f"{leaks(volume)} ({both}), {far(volume, travel)}"
+
+
+def _ratio(strokes: Mapping[str, FilmRow]) -> Iterator[str]:
+    """The least lambda ratio, of rough surfaces."""
+    rough = {s: row for s, row in strokes.items() if row.regime}
+    if rough:
+        stroke, row = min(rough.items(), key=lambda item: item[1].lambda_ratio)
+        yield f"least lambda {row.lambda_ratio:.3g} ({row.regime}, {stroke}stroke)"
+
+
+def _thin(strokes: Mapping[str, FilmRow]) -> str:
+    """Which films are thinner than the roughness of the surfaces, in words."""
+    rough = [s for s, row in strokes.items() if row.regime and row.lambda_ratio < MIXED]
+    smooth = [s for s, row in strokes.items() if not row.regime and row.h_min_um < USUAL]
+    if rough:
+        return f"film below the roughness of the surfaces: {_named(rough)}"
+    if smooth:
+        return f"film below the usual roughness, {USUAL:g} um: {_named(smooth)}"
+    return ""
+
+
+def _named(strokes: Sequence[str]) -> str:
+    return ", ".join(f"{stroke}stroke" for stroke in strokes)
