@@ -28,7 +28,7 @@ SECTIONS = ("Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes")
 """Sections of numpydoc, in their order."""
 INNER = {
     "protocols, which public classes and users' objects satisfy": {
-        *("Engine", "NonlinearProblem", "Solvable"),
+        *("Engine", "FirstOrderIntegrator", "NonlinearProblem", "SecondOrderIntegrator"),
     },
     "records between a public class and its own methods": {
         *("Call", "Located", "NewtonState", "On", "Pattern", "PointForm", "Step"),

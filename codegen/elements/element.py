@@ -88,7 +88,7 @@ class Element:
 
     @property
     def lines(self) -> tuple[tuple[int, ...], ...] | None:
-        """Of elements of order 3 and more: along every direction the node of a line, by nodes."""
+        """Node of a line in every direction, by nodes of the element; None below order 3."""
         if self.exponents:
             return None
         number = {c: k for k, c in enumerate(line_nodes(self.order))}

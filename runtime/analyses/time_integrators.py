@@ -331,8 +331,9 @@ class BackwardEulerDynamics:
 
 @dataclass(frozen=True)
 class CentralDifference:
-    """Central differences (velocity Verlet) with lumped masses: explicit, as many stable steps as a
-    result needs.
+    """Central differences (velocity Verlet) with lumped masses: explicit.
+
+    A result takes as many stable steps as it needs.
     """
 
     name: ClassVar[str] = "explicit"
