@@ -14,11 +14,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
-
-import numpy as np
 
 from softehl.runtime.analyses import arc_length_path, homogenisation, load_stepping, time_stepping
 from softehl.runtime.analyses import buckling as analyses_buckling
@@ -31,32 +29,23 @@ from softehl.runtime.analyses.homogenisation import Cell
 from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.analyses.time_integrators import MethodName, TimeIntegrator
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.definition import argument_checks as read
-from softehl.runtime.definition.contact_sides import touch
+from softehl.runtime.definition import loads_and_supports
+from softehl.runtime.definition.contact_sides import add_contact
 from softehl.runtime.definition.element_blocks import (
     On,
-    beside_of,
-    elements_of,
+    add_block,
     elements_on,
     form_of,
     geometry_of,
-    kinds_of,
-    page_on,
-    wants_traces,
 )
 from softehl.runtime.definition.kernel_loading import Origin, Source
-from softehl.runtime.definition.line_fields import require_apart
 from softehl.runtime.definition.problem_definition import (
-    Condition,
     Datum,
-    Force,
-    Start,
     Statement,
     StudyError,
     Where,
-    shown,
 )
-from softehl.runtime.discretisation.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
+from softehl.runtime.discretisation.loads import Amount
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.system import System
 from softehl.runtime.equations.system_builder import equations
@@ -65,8 +54,6 @@ from softehl.runtime.fit import objective as inverse
 from softehl.runtime.fit.jax_operation import Operation
 from softehl.runtime.fit.least_squares import Bounds, Fit, Measured
 from softehl.runtime.fit.objective import Objective, Trials, varied_definition
-from softehl.runtime.kernels.kernel import Kernel
-from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.parallel.engine import AnyEngine
 from softehl.runtime.parallel.linear_solver_choice import Linear
@@ -74,7 +61,7 @@ from softehl.runtime.results.result import Modes, Result
 from softehl.runtime.sensitivity.input_parsing import By
 from softehl.runtime.sensitivity.inputs import Key
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.suggestions import few, listed
+from softehl.runtime.suggestions import few
 
 
 @dataclass(eq=False)
@@ -205,24 +192,16 @@ class Study:
         ModelError
             The page is wrong.
         """
-        blocks = self._statement.blocks
-        if name in blocks:
-            raise StudyError(f"block {name!r} is there already; blocks: {listed(blocks)}")
-        if (source is None) == (material is None):
-            raise StudyError(f"{name!r}: give a page or material=..., one of them")
-        law = material is not None
-        origin = Origin(
-            material if law else source, model, geometry_of(self.mesh, self.geometry), law
+        geometry = geometry_of(self.mesh, self.geometry)
+        add_block(
+            self._statement,
+            name,
+            Origin.of(name, source, material=material, model=model, geometry=geometry),
+            form_of(name, shared, called, along, rule, constant),
+            on=elements_on(name, on),
+            cells=cells,
+            given=given,
         )
-        form = form_of(name, shared, called, along, rule, constant)
-        on = elements_on(name, on)
-        kernels = self._kernels(origin, on, cells)
-        for kernel in kernels:
-            label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"
-            elements = elements_of(self.mesh, label, kernel, on, cells)
-            block = page_on(self.mesh, label, kernel, elements, form, given)
-            require_apart(block, blocks.values())
-            blocks[label] = replace(block, differentiated=origin.differentiated(kernel))
 
     def load(self, where: Where, **components: Amount) -> None:
         """Add a dead load on a side, per reference length or area, or forces at nodes.
@@ -249,17 +228,7 @@ class Study:
         On straight sides of cells of order p, polynomials of degree p + 2 are integrated exactly. A
         body force is a page.
         """
-        words = f"load({shown(where)})"
-        read.named(words, components, "u_x=1")
-        for name, given in components.items():
-            value = read.amount(words, name, given)
-            if isinstance(where, str) or callable(where):
-                for kind, faces in self.mesh.faces(where).items():
-                    kernel = DeadLoad(CELLS[kind], value, self._ring)
-                    self._add_force("load", where, kernel, faces, (name,))
-            else:
-                nodes = self.mesh.own(read.nodes_of(self.mesh, where))
-                self._add_force("load", where, NodalForce(value), nodes[:, None], (name,))
+        loads_and_supports.add_load(self._statement, where, components)
 
     def pressure(
         self, where: str | Predicate, value: Amount, *, of: Sequence[str] | None = None
@@ -284,17 +253,7 @@ class Study:
         MeshError
             A face belongs to two cells or to none: it has no outside.
         """
-        value = read.amount(f"pressure({shown(where)})", "pressure", value)
-        axes = "xyz"[: self.mesh.dimension]
-        names = tuple(f"u_{axis}" for axis in axes) if of is None else tuple(of)
-        if len(names) != self.mesh.dimension or len(names) == 1:
-            raise StudyError(
-                f"pressure({shown(where)}, of={list(names)}): a displacement for each of "
-                f"{self.mesh.dimension} coordinates is needed, in 2-D or 3-D"
-            )
-        for kind, faces in self.mesh.outer_faces(where).items():
-            kernel = Pressure(CELLS[kind], value, self._ring)
-            self._add_force("pressure", where, kernel, faces, names)
+        loads_and_supports.add_pressure(self._statement, where, value, of)
 
     def spring(self, where: Where, **stiffness: float) -> None:
         """Add a spring to the ground at each node of a side.
@@ -313,11 +272,7 @@ class Study:
         MeshError
             The mesh has no such side or node.
         """
-        read.named(f"spring({shown(where)})", stiffness, "u_x=2")
-        for name, value in stiffness.items():
-            kernel = Spring(read.finite(name, value))
-            nodes = self.mesh.own(read.nodes_of(self.mesh, where))
-            self._add_force("spring", where, kernel, nodes[:, None], (name,))
+        loads_and_supports.add_springs(self._statement, where, stiffness)
 
     def fix(self, where: Where, **values: Amount) -> None:
         """Prescribe unknowns at nodes.
@@ -337,12 +292,7 @@ class Study:
         MeshError
             The mesh has no such side or node.
         """
-        words = f"fix({shown(where)})"
-        read.named(words, values, "u_x=0")
-        for name, given in values.items():
-            value = read.amount(words, name, given)
-            condition = Condition(where, read.nodes_of(self.mesh, where), name, value)
-            self._statement.conditions.append(condition)
+        loads_and_supports.add_conditions(self._statement, where, values)
 
     def tie(
         self, where: Where, to: Where, *names: str, offset: Amount = 0.0, tolerance: float = 1e-6
@@ -374,27 +324,9 @@ class Study:
         -----
         Nodes at one place that belong to bodies without a connection are tied body by body.
         """
-        words = f"tie({shown(where)}, {shown(to)})"
-        self.mesh.require_whole(words)
-        read.named(words, names, f'tie({shown(where)}, {shown(to)}, "u_x", "u_y")')
-        offset = read.amount(words, "offset", offset)
-        ours, theirs = read.nodes_of(self.mesh, where), read.nodes_of(self.mesh, to)
-        if len(theirs) == 1 < len(ours):
-            if offset == 0.0:
-                ours = ours[ours != theirs[0]]  # a node of the side itself
-            if theirs[0] in ours:
-                raise StudyError(f"{words}: the place is a node of the side: offset must be 0")
-            partners = np.repeat(theirs, len(ours))
-        elif len(ours) != len(theirs):
-            raise StudyError(
-                f"{words}: {len(ours)} and {len(theirs)} nodes; sides of equal nodes but for a "
-                "shift are tied, or a side to one place"
-            )
-        else:
-            partners = read.node_partners(self.mesh, ours, theirs, tolerance)
-        for name in names:
-            pairs = np.stack([ours, partners], axis=1)
-            self._add_force("tie", where, Tie(offset), pairs, (name,))
+        loads_and_supports.add_ties(
+            self._statement, where, to, names, offset=offset, tolerance=tolerance
+        )
 
     def contact(
         self,
@@ -436,13 +368,15 @@ class Study:
         MeshError
             The mesh has no such side.
         """
-        if name in self._statement.blocks:
-            known = listed(self._statement.blocks)
-            raise StudyError(f"contact(name={name!r}): the name is taken; blocks: {known}")
-        given = {"friction": friction, "stiffness": stiffness, "depth": depth}
-        found, blocks = touch(self.mesh, name, (side, other), of, self._ring, given)
-        self._statement.blocks.update(blocks)
-        self._statement.contacts.append(found)
+        add_contact(
+            self._statement,
+            name,
+            (side, other),
+            of,
+            friction=friction,
+            stiffness=stiffness,
+            depth=depth,
+        )
 
     def start(self, where: Where | None = None, **values: Datum) -> None:
         """Set initial values of unknowns; they are zero if left out.
@@ -462,12 +396,7 @@ class Study:
         MeshError
             The mesh has no such side or node.
         """
-        read.named("start()", values, "T=20")
-        everywhere = np.arange(len(self.mesh.points))
-        nodes = everywhere if where is None else read.nodes_of(self.mesh, where)
-        for name, value in values.items():
-            found = read.datum("start", name, value, self.mesh.points[nodes])
-            self._statement.start.append(Start(name, nodes, found))
+        loads_and_supports.add_initial_values(self._statement, where, values)
 
     # analyses -----------------------------------------------------------------------------------
 
@@ -1007,33 +936,6 @@ class Study:
     def _ring(self) -> bool:
         """True if sides are those of rings."""
         return self.geometry == "axisymmetric"
-
-    def _kernels(self, origin: Origin, on: On, cells: str | None) -> list[Kernel]:
-        """Kernels of a page on the kinds of cells or faces that are meant."""
-        kinds = kinds_of(self.mesh, on, cells)
-        try:
-            kernels = [origin.loaded(kinds[0] if kinds else None)]
-        except ValueError as error:
-            if on is None or isinstance(on, np.ndarray) or not wants_traces(error):
-                raise
-            kinds = beside_of(self.mesh, on)
-            kernels = [origin.loaded(kinds[0])]
-        if kernels[0].cell and not isinstance(origin.source, Kernel):
-            kernels += [origin.loaded(kind) for kind in kinds[1:]]
-        return kernels
-
-    def _add_force(
-        self,
-        what: str,
-        where: Where,
-        kernel: DeadLoad | NodalForce | Pressure | Spring | Tie,
-        nodes: Integers,
-        names: tuple[str, ...],
-    ) -> None:
-        forces = self._statement.forces
-        label = f"{what} {len(forces) + 1}: {what}({shown(where)}, {', '.join(names)})"
-        place = where if isinstance(where, str) else shown(where)
-        forces.append(Force(label, kernel, nodes, names, what, place))
 
 
 __all__ = ["MeshError", "Source", "Study", "StudyError"]

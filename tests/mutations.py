@@ -427,7 +427,7 @@ FAULTS = (
         "tests/runtime/test_study_forms.py",
     ),
     Fault(
-        "runtime/solve/differences.py",
+        "runtime/analyses/time_integrators.py",
         "-(1.0 + r), r**2 / (1.0 + r)",
         "-(1.0 + r), r / (1.0 + r)",
         "tests/runtime/test_march.py",

@@ -115,7 +115,7 @@ class SecondOrderIntegrator(Protocol):
 
 @dataclass(frozen=True)
 class Euler:
-    """Backward Euler, of order 1."""
+    """Backward Euler, of order 1; short name "euler"."""
 
     name: ClassVar[str] = "euler"
     order: ClassVar[int] = 1
@@ -131,7 +131,10 @@ class Euler:
 
 @dataclass(frozen=True)
 class BDF2:
-    """Backward differences of order 2, of steps of any length; the first step is Euler's."""
+    """Backward differences of order 2, of steps of any length; short name "bdf2".
+
+    The first step is one of Euler.
+    """
 
     name: ClassVar[str] = "bdf2"
     order: ClassVar[int] = 2
@@ -206,7 +209,7 @@ class _WeightedForces:
 
 @dataclass(frozen=True)
 class GeneralisedAlpha(_WeightedForces):
-    """Generalised-alpha method of order 2 (Chung and Hulbert 1993).
+    """Generalised-alpha method of order 2; short name "generalised-alpha".
 
     Parameters
     ----------
@@ -218,6 +221,10 @@ class GeneralisedAlpha(_WeightedForces):
     ------
     StudyError
         The radius is not in [0, 1].
+
+    Notes
+    -----
+    J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371.
     """
 
     name: ClassVar[str] = "generalised-alpha"
@@ -238,7 +245,7 @@ class GeneralisedAlpha(_WeightedForces):
 
 @dataclass(frozen=True)
 class Newmark(_WeightedForces):
-    """Newmark's method (1959).
+    """Newmark's method; short name "newmark".
 
     Parameters
     ----------
@@ -250,6 +257,10 @@ class Newmark(_WeightedForces):
     ------
     StudyError
         beta is not positive, or gamma is below 1/2.
+
+    Notes
+    -----
+    N. M. Newmark, J. Eng. Mech. Div. 85 (1959) 67.
     """
 
     name: ClassVar[str] = "newmark"
@@ -275,7 +286,7 @@ class Newmark(_WeightedForces):
 
 @dataclass(frozen=True)
 class Midpoint:
-    """Midpoint rule with forces averaged along the step (`fem.averaged`): it conserves energy."""
+    """Midpoint rule with the discrete gradient of the energy, which it conserves; "midpoint"."""
 
     name: ClassVar[str] = "midpoint"
     averages_forces: ClassVar[bool] = True
@@ -331,9 +342,9 @@ class BackwardEulerDynamics:
 
 @dataclass(frozen=True)
 class CentralDifference:
-    """Central differences (velocity Verlet) with lumped masses: explicit.
+    """Central differences with lumped masses; short name "explicit".
 
-    A result takes as many stable steps as it needs.
+    Between two results there are as many stable steps as are needed (velocity Verlet).
     """
 
     name: ClassVar[str] = "explicit"

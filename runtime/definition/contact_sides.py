@@ -9,7 +9,13 @@ from softehl.runtime.arrays import Integers
 from softehl.runtime.contact.body_thickness import by_normals, in_chains
 from softehl.runtime.definition.argument_checks import finite
 from softehl.runtime.definition.element_blocks import page_on
-from softehl.runtime.definition.problem_definition import Block, Form, StudyError, shown
+from softehl.runtime.definition.problem_definition import (
+    Block,
+    Form,
+    Statement,
+    StudyError,
+    shown,
+)
 from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, Predicate
@@ -44,15 +50,34 @@ class Touch:
         return f"{self.name}:{multiplier}"
 
 
-def touch(
-    mesh: Mesh,
+def add_contact(
+    definition: Statement,
     name: str,
     sides: tuple[str | Predicate, str | Predicate | None],
     of: Sequence[str] | None,
-    ring: bool,
+    **given: float | None,
+) -> None:
+    """Add contact between two sides; see `Study.contact`.
+
+    given: friction, stiffness, depth.
+    """
+    if name in definition.blocks:
+        existing = listed(definition.blocks)
+        raise StudyError(f"contact(name={name!r}): the name is taken; blocks: {existing}")
+    contact, blocks = _contact_and_sides(definition, name, sides, of, given)
+    definition.blocks.update(blocks)
+    definition.contacts.append(contact)
+
+
+def _contact_and_sides(
+    definition: Statement,
+    name: str,
+    sides: tuple[str | Predicate, str | Predicate | None],
+    of: Sequence[str] | None,
     given: Mapping[str, float | None],
 ) -> tuple[Touch, dict[str, Block]]:
     """A contact and the blocks of its sides.  Raises StudyError, MeshError."""
+    mesh, ring = definition.mesh, definition.ring
     words = f"contact({', '.join(shown(s) for s in sides if s is not None)})"
     mesh.require_whole(words)
     if mesh.dimension not in KINDS:

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.argument_checks import datum, known, parameter
-from softehl.runtime.definition.line_fields import interpolated, placed
-from softehl.runtime.definition.problem_definition import Block, Form, StudyError
+from softehl.runtime.definition.kernel_loading import Origin
+from softehl.runtime.definition.line_fields import interpolated, placed, require_apart
+from softehl.runtime.definition.problem_definition import Block, Form, Statement, StudyError
 from softehl.runtime.discretisation.dofmap import Slot, slots
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.kernels.kernel_call import Rule
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.interior_facets import beside, interior
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
+from softehl.runtime.suggestions import listed
 
 GEOMETRIES = {1: ("solid",), 2: ("plane strain", "axisymmetric"), 3: ("solid",)}
 """Geometries of meshes by their dimension, the default first."""
@@ -258,24 +259,6 @@ def geometry_of(mesh: Mesh, geometry: str | None) -> str:
     return geometry or allowed[0]
 
 
-def is_folder(source: object) -> bool:
-    """True for a folder of C, from which nothing can be derived."""
-    return isinstance(source, str | Path) and Path(source).is_dir()
-
-
-def require_page(source: object) -> None:
-    """Raise StudyError for what cannot be loaded."""
-    if isinstance(source, str | Path) or hasattr(source, "at_point"):
-        return
-    if callable(source) or hasattr(source, "finish") or not hasattr(source, "unknowns"):
-        name = getattr(source, "__name__", type(source).__name__)
-        hint = f", or what {name} returns when it is called" if callable(source) else ""
-        raise StudyError(
-            f"{type(source).__name__} is no page: give a model file, a function under "
-            f"@softehl.page, a kernel, a Definition that m.finish() made{hint}"
-        )
-
-
 def form_of(
     name: str,
     shared: Sequence[str],
@@ -324,3 +307,41 @@ def _rule(name: str, given: Any) -> Rule | None:
         )
     rows = np.array(given.rows(), dtype=np.float64)
     return Rule(rows[:, :-1].copy(), rows[:, -1].copy())
+
+
+def add_block(
+    definition: Statement,
+    name: str,
+    origin: Origin,
+    form: Form,
+    *,
+    on: On,
+    cells: str | None,
+    given: Mapping[str, Any],
+) -> None:
+    """Add elements of a page, a block for each kind of cell; see `Study.add`."""
+    blocks = definition.blocks
+    if name in blocks:
+        raise StudyError(f"block {name!r} is there already; blocks: {listed(blocks)}")
+    kernels = _kernels(definition.mesh, origin, on, cells)
+    for kernel in kernels:
+        label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"
+        elements = elements_of(definition.mesh, label, kernel, on, cells)
+        block = page_on(definition.mesh, label, kernel, elements, form, given)
+        require_apart(block, blocks.values())
+        blocks[label] = replace(block, differentiated=origin.differentiated(kernel))
+
+
+def _kernels(mesh: Mesh, origin: Origin, on: On, cells: str | None) -> list[Kernel]:
+    """Kernels of a page on the selected kinds of cells or faces."""
+    kinds = kinds_of(mesh, on, cells)
+    try:
+        kernels = [origin.loaded(kinds[0] if kinds else None)]
+    except ValueError as error:
+        if on is None or isinstance(on, np.ndarray) or not wants_traces(error):
+            raise
+        kinds = beside_of(mesh, on)
+        kernels = [origin.loaded(kinds[0])]
+    if kernels[0].cell and not isinstance(origin.source, Kernel):
+        kernels += [origin.loaded(kind) for kind in kinds[1:]]
+    return kernels

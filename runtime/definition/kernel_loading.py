@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from softehl.runtime.definition import page_loader
-from softehl.runtime.definition.element_blocks import is_folder, require_page
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.kernels.kernel import Kernel
 
@@ -26,6 +25,17 @@ class Origin:
     model: str | None
     geometry: str
     law: bool
+
+    @classmethod
+    def of(
+        cls, block: str, source: Source, *, material: Source, model: str | None, geometry: str
+    ) -> Origin:
+        """Return the origin of a page or a stress law.  Raises StudyError unless one is given."""
+        if (source is None) == (material is None):
+            raise StudyError(f"{block!r}: give a page or material=..., one of them")
+        if material is None:
+            return cls(source, model, geometry, law=False)
+        return cls(material, model, geometry, law=True)
 
     def loaded(self, kind: str | None) -> Kernel:
         """The kernel on a kind of cell; a kernel is there already."""
@@ -88,4 +98,22 @@ class Derived:
             geometry=origin.geometry,
             materials=origin.law,
             derivatives=derivatives,
+        )
+
+
+def is_folder(source: object) -> bool:
+    """True for a folder of C, from which nothing can be derived."""
+    return isinstance(source, str | Path) and Path(source).is_dir()
+
+
+def require_page(source: object) -> None:
+    """Raise StudyError for what cannot be loaded."""
+    if isinstance(source, str | Path) or hasattr(source, "at_point"):
+        return
+    if callable(source) or hasattr(source, "finish") or not hasattr(source, "unknowns"):
+        name = getattr(source, "__name__", type(source).__name__)
+        hint = f", or what {name} returns when it is called" if callable(source) else ""
+        raise StudyError(
+            f"{type(source).__name__} is no page: give a model file, a function under "
+            f"@softehl.page, a kernel, a Definition that m.finish() made{hint}"
         )

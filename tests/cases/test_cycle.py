@@ -27,7 +27,6 @@ from softehl.runtime.discretisation import quadrature
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.io import read_arrays, read_table
 from softehl.runtime.kernels.kernel import load_kernel
-from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.newton import Newton
 from tests.reference.calling import fitted_order
 
@@ -64,7 +63,7 @@ def march(gap: Gap, times: Array, order: int, ends: float) -> list[tuple[Array, 
         if k:
             steps = [times[k] - times[k - 1]]
             steps += [times[k - 1] - times[k - 2]] if order == 2 and k > 1 else []
-            w = differences(steps)
+            w = softehl.BDF2().weights(steps)
             before = sum(a * c for a, c in zip(w[1:], contents, strict=False))
             points = np.asarray(before)[:, :, None]
             squeezed = problem.assembler.with_data(SQUEEZE, point_data=points)

@@ -31,6 +31,7 @@ from softehl.cases.seal.solve.film_solver import NoFilm
 from softehl.cases.seal.solve.load_stages import StageError
 from softehl.cases.seal.solve.squeeze_film import film_layer
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
+from softehl.runtime.analyses.time_integrators import BDF2, Euler
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear.linear_solver import Condenser
 from softehl.runtime.solve.solution import Branch, Status
@@ -91,7 +92,7 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
     march = March(
         *(begun.system, motion, begun.loads, corrector, film_layer(begun.system, begun.x)),
         tolerance=parameters.time_tolerance,
-        order=parameters.time_order,
+        integrator=BDF2() if parameters.time_order == 2 else Euler(),
         returned=parameters.supply == "returned",
     )
     stuck = _cycles(march, begun.x, parameters.cycles, observer, log)

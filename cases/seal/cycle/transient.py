@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from itertools import pairwise
 from math import nan
 
 import numpy as np
@@ -21,6 +22,7 @@ from softehl.cases.seal.equations.definition import FILM, PRESSURE, SQUEEZE
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.states.results import rough_numbers
+from softehl.runtime.analyses.time_integrators import FirstOrderIntegrator
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.continuation import (
@@ -33,7 +35,6 @@ from softehl.runtime.solve.continuation import (
     next_parameter,
     polynomial_value,
 )
-from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.solution import Branch, Status
 
 
@@ -89,7 +90,7 @@ class March(Stepper):
     """A march in time; `behind` holds the last instants, newest first, and changes with steps.
 
     film: loads that do not change. tolerance: error of the film thickness, relative to it, that a
-    step aims at. order: 1 is backward Euler, 2 is BDF2. returned: whether the instroke finds what
+    step aims at. integrator: backward Euler or BDF2. returned: whether the instroke finds what
     the outstroke left. layer: of the film, near its first state. condensed_at: time of the problem
     whose body the corrector's tangent has condensed, s.
     """
@@ -100,7 +101,7 @@ class March(Stepper):
     corrector: SchurCorrector
     layer: Layer
     tolerance: float
-    order: int
+    integrator: FirstOrderIntegrator
     returned: bool
     rod: RodFilm = field(default_factory=lambda: RodFilm([], []))
     behind: list[Instant] = field(default_factory=list)
@@ -241,10 +242,9 @@ class March(Stepper):
 
     def _differences(self, dt: float) -> tuple[float, list[tuple[float, Instant]]]:
         """Weights of d/dt at the end of a step: its own, those of the instants before."""
-        steps = [dt]
-        if self.order > 1 and len(self.behind) > 1:
-            steps.append(self.behind[0].t - self.behind[1].t)
-        rate, *weights = differences(steps).tolist()
+        last = self.behind[: self.integrator.order]
+        steps = [dt, *(newer.t - older.t for newer, older in pairwise(last))]
+        rate, *weights = self.integrator.weights(steps).tolist()
         return rate, list(zip(weights, self.behind, strict=False))
 
     def _error(self, x: Array, guess: Array) -> float:

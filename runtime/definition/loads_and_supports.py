@@ -1,0 +1,139 @@
+"""Loads, pressures, springs, supports, ties and initial values that are added to a definition."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from softehl.runtime.arrays import Integers
+from softehl.runtime.definition import argument_checks as read
+from softehl.runtime.definition.problem_definition import (
+    Condition,
+    Datum,
+    Force,
+    Start,
+    Statement,
+    StudyError,
+    Where,
+    shown,
+)
+from softehl.runtime.discretisation.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.mesh import Predicate
+
+
+def add_load(definition: Statement, where: Where, components: Mapping[str, Amount]) -> None:
+    """Add dead loads or nodal forces; see `Study.load`."""
+    mesh = definition.mesh
+    words = f"load({shown(where)})"
+    read.named(words, components, "u_x=1")
+    for name, given in components.items():
+        value = read.amount(words, name, given)
+        if isinstance(where, str) or callable(where):
+            for kind, faces in mesh.faces(where).items():
+                kernel = DeadLoad(CELLS[kind], value, definition.ring)
+                _add_force(definition, "load", where, kernel, faces, (name,))
+        else:
+            nodes = mesh.own(read.nodes_of(mesh, where))
+            _add_force(definition, "load", where, NodalForce(value), nodes[:, None], (name,))
+
+
+def add_pressure(
+    definition: Statement, where: str | Predicate, value: Amount, of: Sequence[str] | None
+) -> None:
+    """Add a follower pressure; see `Study.pressure`."""
+    mesh = definition.mesh
+    value = read.amount(f"pressure({shown(where)})", "pressure", value)
+    axes = "xyz"[: mesh.dimension]
+    names = tuple(f"u_{axis}" for axis in axes) if of is None else tuple(of)
+    if len(names) != mesh.dimension or len(names) == 1:
+        raise StudyError(
+            f"pressure({shown(where)}, of={list(names)}): a displacement for each of "
+            f"{mesh.dimension} coordinates is needed, in 2-D or 3-D"
+        )
+    for kind, faces in mesh.outer_faces(where).items():
+        kernel = Pressure(CELLS[kind], value, definition.ring)
+        _add_force(definition, "pressure", where, kernel, faces, names)
+
+
+def add_springs(definition: Statement, where: Where, stiffness: Mapping[str, float]) -> None:
+    """Add springs to the ground; see `Study.spring`."""
+    mesh = definition.mesh
+    read.named(f"spring({shown(where)})", stiffness, "u_x=2")
+    for name, value in stiffness.items():
+        kernel = Spring(read.finite(name, value))
+        nodes = mesh.own(read.nodes_of(mesh, where))
+        _add_force(definition, "spring", where, kernel, nodes[:, None], (name,))
+
+
+def add_conditions(definition: Statement, where: Where, values: Mapping[str, Amount]) -> None:
+    """Prescribe unknowns at nodes; see `Study.fix`."""
+    mesh = definition.mesh
+    words = f"fix({shown(where)})"
+    read.named(words, values, "u_x=0")
+    for name, given in values.items():
+        value = read.amount(words, name, given)
+        condition = Condition(where, read.nodes_of(mesh, where), name, value)
+        definition.conditions.append(condition)
+
+
+def add_ties(
+    definition: Statement,
+    where: Where,
+    to: Where,
+    names: tuple[str, ...],
+    *,
+    offset: Amount,
+    tolerance: float,
+) -> None:
+    """Tie unknowns of one side to those of another; see `Study.tie`."""
+    mesh = definition.mesh
+    words = f"tie({shown(where)}, {shown(to)})"
+    mesh.require_whole(words)
+    read.named(words, names, f'tie({shown(where)}, {shown(to)}, "u_x", "u_y")')
+    offset = read.amount(words, "offset", offset)
+    ours, theirs = read.nodes_of(mesh, where), read.nodes_of(mesh, to)
+    if len(theirs) == 1 < len(ours):
+        if offset == 0.0:
+            ours = ours[ours != theirs[0]]  # a node of the side itself
+        if theirs[0] in ours:
+            raise StudyError(f"{words}: the place is a node of the side: offset must be 0")
+        partners = np.repeat(theirs, len(ours))
+    elif len(ours) != len(theirs):
+        raise StudyError(
+            f"{words}: {len(ours)} and {len(theirs)} nodes; sides of equal nodes but for a "
+            "shift are tied, or a side to one place"
+        )
+    else:
+        partners = read.node_partners(mesh, ours, theirs, tolerance)
+    for name in names:
+        pairs = np.stack([ours, partners], axis=1)
+        _add_force(definition, "tie", where, Tie(offset), pairs, (name,))
+
+
+def add_initial_values(
+    definition: Statement, where: Where | None, values: Mapping[str, Datum]
+) -> None:
+    """Set initial values of unknowns; see `Study.start`."""
+    mesh = definition.mesh
+    read.named("start()", values, "T=20")
+    everywhere = np.arange(len(mesh.points))
+    nodes = everywhere if where is None else read.nodes_of(mesh, where)
+    for name, value in values.items():
+        found = read.datum("start", name, value, mesh.points[nodes])
+        definition.start.append(Start(name, nodes, found))
+
+
+def _add_force(
+    definition: Statement,
+    what: str,
+    where: Where,
+    kernel: DeadLoad | NodalForce | Pressure | Spring | Tie,
+    nodes: Integers,
+    names: tuple[str, ...],
+) -> None:
+    forces = definition.forces
+    label = f"{what} {len(forces) + 1}: {what}({shown(where)}, {', '.join(names)})"
+    place = where if isinstance(where, str) else shown(where)
+    forces.append(Force(label, kernel, nodes, names, what, place))
