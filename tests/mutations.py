@@ -373,8 +373,8 @@ FAULTS = (
     ),
     Fault(
         "runtime/analyses/time_integrators.py",
-        "return 0.5 - self.am + self.af",
-        "return 0.5 + self.am - self.af",
+        "** 2, 0.5 - am + af",
+        "** 2, 0.5 + am - af",
         "tests/runtime/test_dynamics.py",
     ),
     Fault(

@@ -28,10 +28,10 @@ SECTIONS = ("Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes")
 """Sections of numpydoc, in their order."""
 INNER = {
     "protocols, which public classes and users' objects satisfy": {
-        *("Engine", "FirstOrderIntegrator", "NonlinearProblem", "SecondOrderIntegrator"),
+        *("Engine", "Kinematics", "NonlinearProblem"),
     },
     "records between a public class and its own methods": {
-        *("Call", "Located", "NewtonState", "On", "Pattern", "PointForm", "Step"),
+        *("Affine", "Call", "Located", "NewtonState", "On", "Pattern", "PointForm", "Step"),
     },
 }
 """Classes in annotations that no user makes or keeps."""

@@ -52,22 +52,48 @@ class Kinematics(Protocol):
 
 @runtime_checkable
 class FirstOrderIntegrator(Protocol):
-    """Backward difference formula for du/dt."""
+    """Backward difference formula for du/dt.
+
+    Attributes
+    ----------
+    name : str
+        Short name.
+    order : int
+        Order, and number of previous states.
+    """
 
     name: ClassVar[str]
     order: ClassVar[int]
 
     def weights(self, steps: Sequence[float]) -> Array:
-        """Weights of d/dt at the newest time, newest first.
+        """Return the weights of d/dt at the newest time.
 
-        steps: lengths of the last steps, the newest first, `order` of them or fewer at the start.
+        Parameters
+        ----------
+        steps : sequence of float
+            Lengths of the last steps, the newest first: `order` of them, or fewer at the start [s].
+
+        Returns
+        -------
+        array (steps + 1,)
+            Weights of the states, the newest first [1/s].
         """
         ...
 
     def error_fraction(self, dt: float, two_steps: float) -> float:
-        """Local error, as a fraction of the difference from the extrapolated previous states.
+        """Return the local error as a fraction of a known difference.
 
-        two_steps: length of the step dt and of the previous one together.
+        Parameters
+        ----------
+        dt : float
+            Length of the step [s].
+        two_steps : float
+            Length of the step and the previous one together [s].
+
+        Returns
+        -------
+        float
+            Local error over the difference from the extrapolated previous states.
         """
         ...
 
@@ -76,40 +102,103 @@ class FirstOrderIntegrator(Protocol):
 class SecondOrderIntegrator(Protocol):
     """Implicit formulas for velocities and accelerations.
 
-    averages_forces: forces are means along the step. damps: fast motions lose amplitude.
-    load_time: fraction of the step at whose end loads are evaluated. initial_weight: factor of the
-    forces at the beginning of a step in its equation. final_weight: of those at its end.
+    Attributes
+    ----------
+    name : str
+        Short name.
+    averages_forces : bool
+        True if forces are means along the step.
     """
 
     name: ClassVar[str]
     averages_forces: ClassVar[bool]
 
     @property
-    def damps(self) -> bool: ...
+    def damps(self) -> bool:
+        """True if fast motions lose amplitude."""
+        ...
 
     @property
-    def load_time(self) -> float: ...
+    def load_time(self) -> float:
+        """Fraction of the step at which loads are evaluated."""
+        ...
 
     @property
-    def initial_weight(self) -> float: ...
+    def initial_weight(self) -> float:
+        """Factor of the initial forces in the equation of a step."""
+        ...
 
     @property
-    def final_weight(self) -> float: ...
+    def final_weight(self) -> float:
+        """Weight of the forces at the end of a step."""
+        ...
 
     def velocity(self, dt: float, state: Kinematics) -> Affine:
-        """Velocity at the end of a step that begins with a state."""
+        """Return the velocity at the end of a step.
+
+        Parameters
+        ----------
+        dt : float
+            Length of the step [s].
+        state : object
+            Unknowns x, velocities v and accelerations a (n,) at the beginning of the step.
+
+        Returns
+        -------
+        Affine
+            c and rest (n,): the velocity is c u + rest, of the unknowns u at the end.
+        """
         ...
 
     def acceleration(self, dt: float, state: Kinematics) -> Affine:
-        """Acceleration at the end of a step."""
+        """Return the acceleration at the end of a step.
+
+        Parameters
+        ----------
+        dt : float
+            Length of the step [s].
+        state : object
+            Unknowns x, velocities v and accelerations a (n,) at the beginning of the step.
+
+        Returns
+        -------
+        Affine
+            c and rest (n,): the acceleration is c u + rest, of the unknowns u at the end.
+        """
         ...
 
     def equation_velocity(self, dt: float, state: Kinematics) -> Affine:
-        """Velocity in the equation of a step."""
+        """Return the velocity in the equation of a step.
+
+        Parameters
+        ----------
+        dt : float
+            Length of the step [s].
+        state : object
+            Unknowns x, velocities v and accelerations a (n,) at the beginning of the step.
+
+        Returns
+        -------
+        Affine
+            c and rest (n,): the velocity is c u + rest, of the unknowns u at the end.
+        """
         ...
 
     def equation_acceleration(self, dt: float, state: Kinematics) -> Affine:
-        """Acceleration in the equation of a step."""
+        """Return the acceleration in the equation of a step.
+
+        Parameters
+        ----------
+        dt : float
+            Length of the step [s].
+        state : object
+            Unknowns x, velocities v and accelerations a (n,) at the beginning of the step.
+
+        Returns
+        -------
+        Affine
+            c and rest (n,): the acceleration is c u + rest, of the unknowns u at the end.
+        """
         ...
 
 

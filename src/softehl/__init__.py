@@ -57,9 +57,11 @@ if TYPE_CHECKING:
         BDF2,
         CentralDifference,
         Euler,
+        FirstOrderIntegrator,
         GeneralisedAlpha,
         Midpoint,
         Newmark,
+        SecondOrderIntegrator,
     )
     from softehl.runtime.definition.problem_definition import StudyError
     from softehl.runtime.discretisation.assembly import Assembler
@@ -121,6 +123,7 @@ _PUBLIC = {
     "EnergyGain": "softehl.runtime.analyses.motion",
     "Euler": "softehl.runtime.analyses.time_integrators",
     "FilmState": "softehl.cases.seal.states.state",
+    "FirstOrderIntegrator": "softehl.runtime.analyses.time_integrators",
     "Fit": "softehl.runtime.fit.least_squares",
     "GeneralisedAlpha": "softehl.runtime.analyses.time_integrators",
     "Homogenised": "softehl.runtime.analyses.homogenisation",
@@ -156,6 +159,7 @@ _PUBLIC = {
     "Profile": "softehl.cases.seal.states.state",
     "Result": "softehl.runtime.results.result",
     "Seal": "softehl.cases.seal.gland.parameters",
+    "SecondOrderIntegrator": "softehl.runtime.analyses.time_integrators",
     "Series": "softehl.runtime.analyses.callbacks",
     "Silent": "softehl.cases.seal.states.state",
     "SingularMatrix": "softehl.runtime.solve.linear.linear_solver",
@@ -223,6 +227,7 @@ __all__ = [
     "Euler",
     "Fields",
     "FilmState",
+    "FirstOrderIntegrator",
     "Fit",
     "GeneralisedAlpha",
     "Homogenised",
@@ -267,6 +272,7 @@ __all__ = [
     "QuadratureRule",
     "Result",
     "Seal",
+    "SecondOrderIntegrator",
     "Series",
     "Silent",
     "SingularMatrix",
