@@ -44,7 +44,7 @@ def write(names: Sequence[str], folder: Path, target: str) -> None:
         (folder / name).write_text(text, encoding="utf-8")
     for kernel in kernels:
         f = kernel.functions["tangent"]
-        print(kernel.definition.name, f.chosen.operations, f.temporaries)
+        print(kernel.definition.name, f.best.operations, f.temporaries)
     build.build(folder)
 
 

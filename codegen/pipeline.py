@@ -72,17 +72,17 @@ class Attempt:
 class Function:
     """One kernel: its C text and how it came about.
 
-    `found` is what was found in the potential (None: nothing, or the task differentiates nothing);
-    of the `attempts` one was `chosen`; `plan` is its schedule in the printed order. shared: names
-    and texts of files that other kernels may have, too.
+    structure: that of the potential (None: none, or the task differentiates nothing). attempts:
+    all chain rules that were tried. best: the one with fewest operations. plan: its schedule in the
+    printed order. shared: names and texts of files that other kernels may have, too.
     """
 
     text: str
     plan: Schedule
     temporaries: int
-    found: Structure | None
+    structure: Structure | None
     attempts: tuple[Attempt, ...]
-    chosen: Attempt
+    best: Attempt
     printer: str
     routines: tuple[Routine, ...] = ()
     shared: tuple[tuple[str, str], ...] = ()
@@ -94,7 +94,7 @@ class KernelSource:
 
     design: a second C file with the tasks of sensitivities, empty where none is offered, or where
     they call the same routines as the others. shared:
-    files that other families may have, too, by name. kept: numbers that products by sum
+    files that other families may have, too, by name. cached: numbers that products by sum
     factorisation keep at a point, 0 where there are none.
     """
 
@@ -103,7 +103,7 @@ class KernelSource:
     functions: Mapping[str, Function]
     design: str = ""
     shared: Mapping[str, str] = field(default_factory=dict)
-    kept: int = 0
+    cached: int = 0
 
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
@@ -117,8 +117,8 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     if target is Target.UFCX:
         texts = [f.text for f in functions.values()]
         used = dict.fromkeys(r for f in functions.values() for r in f.routines)
-        before = c_routines.texts(definition, used)
-        return KernelSource(definition, ufcx.source(definition, texts, before), functions)
+        preamble = c_routines.texts(definition, used)
+        return KernelSource(definition, ufcx.source(definition, texts, preamble), functions)
     design = [f for t, f in functions.items() if t in DESIGN]
     others = [f for t, f in functions.items() if t not in DESIGN]
     if {r for f in others for r in f.routines} & {r for f in design for r in f.routines}:
@@ -143,11 +143,11 @@ def _with_action(made: KernelSource) -> KernelSource:
         return made
     outputs, plan, called = _ordered(layout, Task.PRODUCT)
     action = sum_factored_product.Factored(layout, outputs, plan)
-    before = simd_routines.texts(layout.site, dict.fromkeys(called))
-    text = action.text(before)
-    text = action.text([*simd_printer.wrappers(text), *before])
+    preamble = simd_routines.texts(layout.site, dict.fromkeys(called))
+    text = action.text(preamble)
+    text = action.text([*simd_printer.wrappers(text), *preamble])
     shared = {**made.shared, f"{d.name}_action.c": text}
-    return replace(made, shared=shared, kept=len(action.kept.names))
+    return replace(made, shared=shared, cached=len(action.cache.names))
 
 
 def form(d: Definition) -> Choice:
@@ -155,11 +155,11 @@ def form(d: Definition) -> Choice:
     if d.point is None:
         return Choice(False, "no page of fields")
     site = d.point.definition
-    strange = [
+    unsupported = [
         t for t, _ in d.derivatives if point_outputs.argument(site, derivative_task(t)) is None
     ]
-    if strange:
-        return Choice(False, f"a derivative by {strange[0]}, which a point does not know")
+    if unsupported:
+        return Choice(False, f"a derivative by {unsupported[0]}, which a point does not know")
     attempt = _moduli(site, Task.TANGENT)
     outputs = PointOutputs(attempt.entries)
     return choose(Layout(d, d.point), outputs, attempt.operations, SHORT)
@@ -180,25 +180,25 @@ def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
         texts = [functions[t].text for t in some]
         called = dict.fromkeys(r for t in some for r in functions[t].routines)
         routines = simd_routines.texts(layout.site, called)
-        before = simd_printer.wrappers("".join([*routines, *texts]))
-        places = [layout, *([layout.at_centroid()] if layout.form.centroid else [])]
-        tables = [cell_constants.used(place, "".join(texts)) for place in places]
-        before += [*routines, *dict.fromkeys(table for some in tables for table in some)]
-        files.append(c_source.source(d, texts, before) if texts else "")
+        preamble = simd_printer.wrappers("".join([*routines, *texts]))
+        layouts = [layout, *([layout.at_centroid()] if layout.form.centroid else [])]
+        tables = [cell_constants.used(each, "".join(texts)) for each in layouts]
+        preamble += [*routines, *dict.fromkeys(table for some in tables for table in some)]
+        files.append(c_source.source(d, texts, preamble) if texts else "")
     shared = dict(pair for f in functions.values() for pair in f.shared)
     return KernelSource(d, files[0], functions, files[1], shared)
 
 
 def _at_point(layout: Layout, task: str) -> Function:
     """One kernel of a page of fields: the function of a point and the loops of the cell."""
-    chosen = _moduli(layout.site, task)
-    outputs, plan, called = _ordered(layout, task, chosen)
+    attempt = _moduli(layout.site, task)
+    outputs, plan, called = _ordered(layout, task, attempt)
     made = point_kernel.kernel(
         layout, task, point_kernel.At(outputs, plan), _at_centroid(layout, task, outputs)
     )
     shared = () if made.shared is None else (made.shared,)
     return Function(
-        made.text, plan, made.temporaries, None, (chosen,), chosen, "points", called, shared
+        made.text, plan, made.temporaries, None, (attempt,), attempt, "points", called, shared
     )
 
 
@@ -209,19 +209,19 @@ def _at_centroid(layout: Layout, task: str, point: PointOutputs) -> point_kernel
     read = {*needs["dofs"], *(k - first for k in needs["direction"])}
     if not read.intersection(form.centroid):
         return None
-    way = Variant("at the centroid", point_outputs.at_centroid(form, task))
-    attempt = _attempt(layout.site, way, unrolled=True)
+    variant = Variant("at the centroid", point_outputs.at_centroid(form, task))
+    attempt = _attempt(layout.site, variant, unrolled=True)
     outputs, plan, _ = _ordered(layout, task, attempt)
     return point_kernel.At(PointOutputs(outputs.entries, square=False), plan)
 
 
 def _ordered(
-    layout: Layout, task: str, chosen: Attempt | None = None
+    layout: Layout, task: str, attempt: Attempt | None = None
 ) -> tuple[PointOutputs, Schedule, tuple[Routine, ...]]:
     """Outputs of a task at a point, statements in the printed order, and routines they call."""
     site = layout.site
-    chosen = chosen or _moduli(site, task)
-    entries, plan = chosen.entries, chosen.plan
+    attempt = attempt or _moduli(site, task)
+    entries, plan = attempt.entries, attempt.plan
     called = tuple(c_routines.called([x.node for x in entries]))
     if is_straight(plan):
         roots, order = arranged(site.graph, [x.node for x in entries])
@@ -235,18 +235,18 @@ def _file(d: Definition, functions: Sequence[Function], *, single: bool) -> str:
     """The C file of some functions, with the routines that they call. single: with one lane."""
     routines = simd_routines.texts(d, dict.fromkeys(r for f in functions for r in f.routines))
     called = "".join([*routines, *(f.text for f in functions)])
-    before = simd_printer.wrappers(called) + routines
-    return c_source.source(d, [f.text for f in functions], before, single=single)
+    preamble = simd_printer.wrappers(called) + routines
+    return c_source.source(d, [f.text for f in functions], preamble, single=single)
 
 
 def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Function:
     """One kernel, all stages in the order of this file's first lines."""
     forms = potential_structure.linear_forms(d) if task_outputs.differentiated(task) else None
-    found = None if forms is None else potential_structure.quadratic_values(d, forms)
-    ways = [_for_target(v, task, target) for v in task_outputs.variants(d, task, found)]
-    attempts = tuple(_attempts(d, task, ways))
-    chosen = min(attempts, key=lambda a: a.operations)
-    entries, plan = chosen.entries, chosen.plan
+    structure = None if forms is None else potential_structure.quadratic_values(d, forms)
+    alternatives = [_for_target(v, task, target) for v in task_outputs.variants(d, task, structure)]
+    attempts = tuple(_attempts(d, task, alternatives))
+    best = min(attempts, key=lambda a: a.operations)
+    entries, plan = best.entries, best.plan
     called = tuple(c_routines.called([x.node for x in entries]))
     self_contained = target is Target.UFCX
     if not self_contained and is_straight(plan):
@@ -257,33 +257,33 @@ def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Func
     write = ufcx.function if self_contained else simd_kernel.function
     text, temporaries = write(d, task, entries, plan)
     name = "ufcx" if self_contained else "simd"
-    return Function(text, plan, temporaries, found, attempts, chosen, name, called)
+    return Function(text, plan, temporaries, structure, attempts, best, name, called)
 
 
-def _attempts(d: Definition, task: str, ways: Sequence[Variant]) -> Iterator[Attempt]:
+def _attempts(d: Definition, task: str, alternatives: Sequence[Variant]) -> Iterator[Attempt]:
     """Every way with a loop over the points; of short ones also with the loop written out.
 
     A page may have decided (`Definition.unroll`), or the task does.  A loop over shape functions
     stands inside the one over the points, which stays.
     """
     fixed = False if task in ROLLED or d.interpolated else d.unroll
-    least = 0
+    fewest = 0
     if not fixed:
-        looped = [_attempt(d, way, unrolled=False) for way in ways]
+        looped = [_attempt(d, variant, unrolled=False) for variant in alternatives]
         yield from looped
-        least = min(a.operations for a in looped)
-    if fixed or (fixed is None and least <= SHORT):
-        yield from (_attempt(d, way, unrolled=True) for way in ways)
+        fewest = min(a.operations for a in looped)
+    if fixed or (fixed is None and fewest <= SHORT):
+        yield from (_attempt(d, variant, unrolled=True) for variant in alternatives)
 
 
 def _for_target(v: Variant, task: str, target: Target) -> Variant:
-    return Variant(v.rule, ufcx.chosen(v.entries, task)) if target is Target.UFCX else v
+    return Variant(v.rule, ufcx.task_entries(v.entries, task)) if target is Target.UFCX else v
 
 
-def _attempt(d: Definition, way: Variant, *, unrolled: bool) -> Attempt:
+def _attempt(d: Definition, variant: Variant, *, unrolled: bool) -> Attempt:
     straight = passes.straight_line(d.rule.rows(), (len(d.data), len(d.point_data)))
     rewrites = straight if unrolled else passes.STANDARD
-    roots, trace = passes.run(d.graph, [x.node for x in way.entries], rewrites)
+    roots, trace = passes.run(d.graph, [x.node for x in variant.entries], rewrites)
     plan = schedule(roots)
     work = plan.operations_once + len(d.rule.points) * plan.operations_per_point
-    return Attempt(way.rule, unrolled, placed(way.entries, roots), trace, plan, work)
+    return Attempt(variant.rule, unrolled, placed(variant.entries, roots), trace, plan, work)

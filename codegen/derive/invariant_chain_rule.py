@@ -27,10 +27,10 @@ def by_slopes(d: Definition, s: Structure) -> Modal:
     upper = tuple(
         n for n in reachable([s.root, *s.constant], stop=inner.__contains__) if n in inner
     )
-    return Modal(d, s, (upper,), _slopes(d.graph, s.interface, upper))
+    return Modal(d, s, (upper,), _named_derivatives(d.graph, s.interface, upper))
 
 
-def _slopes(
+def _named_derivatives(
     g: Graph, interface: LinearInterface, upper: Sequence[Node]
 ) -> dict[Node, dict[Node, Node]]:
     """Named derivatives of the upper interface with respect to the point interface.
@@ -53,14 +53,14 @@ def _slopes(
 class Modal:
     """Derivatives in modal coordinates, carried to the unknowns by their constant matrix.
 
-    `upper` holds the interfaces above the point values, lowest first; `slopes` the derivatives of
-    their values with respect to the point values, where these are taken at once.
+    `upper` holds the interfaces above the point values, lowest first; `derivatives` those
+    of their values with respect to the point values, where these are taken at once.
     """
 
     d: Definition
     s: Structure
     upper: tuple[tuple[Node, ...], ...]
-    slopes: Given = field(default_factory=dict)
+    derivatives: Given = field(default_factory=dict)
 
     def _adjoint(self) -> dict[Node, Node]:
         return gradient(
@@ -68,21 +68,21 @@ class Modal:
             self.s.root,
             self.s.interface.modes,
             constant=self.s.constant,
-            given=self.slopes,
+            prescribed=self.derivatives,
             named=[*self.s.interface.point, *(n for level in self.upper for n in level)],
         )
 
     def residual(self) -> list[Entry]:
         """R_i = sum of V_ki dPi/dm_k."""
         adjoint = self._adjoint()
-        rows = self._spread([adjoint[m] for m in self.s.interface.modes])
+        rows = self._at_unknowns([adjoint[m] for m in self.s.interface.modes])
         return [Entry(Slot(False, i), None, n) for i, n in enumerate(rows)]
 
     def tangent(self) -> list[Entry]:
         """K_ij = sum of V_ki (d2 Pi / dm_k dm_l) V_lj."""
         modal = self._modal_tangent()
-        half = [self._spread(row) for row in modal]
-        full = [self._spread(column) for column in zip(*half, strict=True)]
+        half = [self._at_unknowns(row) for row in modal]
+        full = [self._at_unknowns(column) for column in zip(*half, strict=True)]
         size = range(len(full))
         upper = self.d.conservative
         return [
@@ -104,7 +104,7 @@ class Modal:
             return rows
         by_constant = self._forward(adjoint, self.s.constant, modes)
         levels = self._levels()
-        moving = Linearisation(g, modes, levels[0], upper=levels[1:], given=self.slopes)
+        moving = Linearisation(g, modes, levels[0], upper=levels[1:], prescribed=self.derivatives)
         for i, c in enumerate(self.s.constant):
             for k in size:
                 slope = by_constant.derivative(adjoint[modes[k]], i)
@@ -127,13 +127,13 @@ class Modal:
             levels[0],
             symmetric={adjoint[z]: z for level in levels for z in level if z in adjoint},
             constant=constant,
-            given=self.slopes,
+            prescribed=self.derivatives,
             upper=levels[1:],
             gates={adjoint[z]: k for k, level in enumerate(levels) for z in level if z in adjoint},
             certain=Certain([self.s.root]),
         )
 
-    def _spread(self, modal: Sequence[Node]) -> list[Node]:
+    def _at_unknowns(self, modal: Sequence[Node]) -> list[Node]:
         """Values at the unknowns of a linear functional of the modal coordinates."""
         g: Graph = self.d.graph
         at = {u.id: i for i, u in enumerate(self.d.directions)}

@@ -75,13 +75,13 @@ class _Expansion:
 
     def linear(self, form: Node) -> dict[int | None, Polynomial]:
         """Coefficients by source id; None holds the constant part."""
-        known: dict[Node, dict[int | None, Polynomial]] = {}
+        coefficients: dict[Node, dict[int | None, Polynomial]] = {}
         for n in reachable([form], stop=lambda n: self.degree[n] == 0 or n.op is Op.NAME):
-            known[n] = self._linear(n, known)
-        return known[form]
+            coefficients[n] = self._linear(n, coefficients)
+        return coefficients[form]
 
     def _linear(
-        self, n: Node, known: Mapping[Node, dict[int | None, Polynomial]]
+        self, n: Node, coefficients: Mapping[Node, dict[int | None, Polynomial]]
     ) -> dict[int | None, Polynomial]:
         if self.degree[n] == 0:
             return {None: self.polynomial(n)}
@@ -89,13 +89,13 @@ class _Expansion:
             case Op.INPUT | Op.NAME:
                 return {n.id: {(): Fraction(1)}}
             case Op.NEG:
-                return _combined(known[n.args[0]], {}, -1, -1)
+                return _combined(coefficients[n.args[0]], {}, -1, -1)
             case Op.ADD | Op.SUB:
-                a, b = (known[x] for x in n.args)
+                a, b = (coefficients[x] for x in n.args)
                 return _combined(a, b, 1, 1 if n.op is Op.ADD else -1)
         factor, inner = n.args if self.degree[n.args[0]] == 0 else tuple(reversed(n.args))
         p = self.polynomial(factor)
-        return {k: product(p, q) for k, q in known[inner].items()}
+        return {k: product(p, q) for k, q in coefficients[inner].items()}
 
     def polynomial(self, n: Node) -> Polynomial:
         """A value of degree 0 as a polynomial in atoms."""
@@ -176,17 +176,20 @@ def linear_interface(
 ) -> LinearInterface | None:
     """Expand every linear form below `roots`; None where nothing is gained."""
     degree = degrees(roots, sources)
-    found = _Forms(g, degree)
+    expanded = _Forms(g, degree)
     linear = forms(roots, degree)
-    rewritten = {z: found.rewrite(z) for z in linear}
-    if len(found.modes) > len(sources):
+    rewritten = {z: expanded.rewrite(z) for z in linear}
+    if len(expanded.modes) > len(sources):
         return None
-    if sum(y.varying for y in found.point.values()) > sum(z.varying for z in linear):
+    if sum(y.varying for y in expanded.point.values()) > sum(z.varying for z in linear):
         wide = _Forms(g, degree, by_mode=True)
         rewritten = {z: wide.rewrite(z) for z in linear}
         return LinearInterface(rewritten, (), tuple(wide.modes.values()), tuple(wide.modes))
     return LinearInterface(
-        rewritten, tuple(found.point.values()), tuple(found.modes.values()), tuple(found.modes)
+        rewritten,
+        tuple(expanded.point.values()),
+        tuple(expanded.modes.values()),
+        tuple(expanded.modes),
     )
 
 

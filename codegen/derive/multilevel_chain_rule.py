@@ -35,7 +35,7 @@ class Linearisation:
     interface: Collection[Node] = ()
     symmetric: Mapping[Node, Node] = field(default_factory=dict)
     constant: Collection[Node] = ()
-    given: Given = field(default_factory=dict)
+    prescribed: Given = field(default_factory=dict)
     upper: Sequence[Collection[Node]] = ()
     gates: Mapping[Node, int] = field(default_factory=dict)
     certain: Certain = field(default_factory=Certain)
@@ -43,7 +43,7 @@ class Linearisation:
     _locals: dict[tuple[Node, int], dict[Node, Node]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._depends = Dependence(tuple(self.directions), self.constant, self.given)
+        self._depends = Dependence(tuple(self.directions), self.constant, self.prescribed)
         self._adjoint_of = {z: a for a, z in self.symmetric.items()}
         self._points = [j for j, d in enumerate(self.directions) if d.varying]
         self._interface, self._ends_in = frozenset(self.interface), frozenset(self.directions)
@@ -82,7 +82,7 @@ class Linearisation:
 
     def _below(self, n: Node, level: int) -> dict[Node, Node]:
         """Derivatives of a named value with respect to what lies below it."""
-        return dict(self.given[n]) if n in self.given else self.local(n.args[0], level)
+        return dict(self.prescribed[n]) if n in self.prescribed else self.local(n.args[0], level)
 
     def _over(self, local: Mapping[Node, Node], j: int) -> Recursion[Node]:
         """Chain rule over the interface: sum of d n/d z times d z/d(direction)."""
@@ -103,23 +103,25 @@ class Linearisation:
         return result
 
     def _chain(self, n: Node) -> Partials:
-        pairs = list(self.given[n].items()) if n in self.given else partials(self.g, n)
+        pairs = list(self.prescribed[n].items()) if n in self.prescribed else partials(self.g, n)
         return [(a, p) for a, p in pairs if self._depends(a)]
 
     def local(self, n: Node, level: int = 0) -> dict[Node, Node]:
         """Derivatives of a value at the point by the interface `level` and those below."""
-        for m in reachable([n], stop=lambda m: self._ends(m, level)):
+        for m in reachable([n], stop=lambda m: self._stops(m, level)):
             if (m, level) not in self._locals:
                 self._locals[m, level] = self._compute_local(m, level)
         return self._locals[n, level]
 
-    def _ends(self, n: Node, level: int) -> bool:
+    def _stops(self, n: Node, level: int) -> bool:
         gate = self.gates.get(n, 0) > level
         return (n, level) in self._locals or gate or self._is_key(n, level)
 
     def _is_key(self, n: Node, level: int) -> bool:
-        own = self._level.get(n)
-        return not n.varying or n in self._ends_in or (own is not None and own <= level)
+        node_level = self._level.get(n)
+        return (
+            not n.varying or n in self._ends_in or (node_level is not None and node_level <= level)
+        )
 
     def _compute_local(self, n: Node, level: int) -> dict[Node, Node]:
         g = self.g
@@ -160,14 +162,14 @@ class Linearisation:
 
     def _mirrored(self, n: Node, result: dict[Node, Node], level: int) -> dict[Node, Node]:
         """Schwarz: d(dW/dz_k)/dz_l is d(dW/dz_l)/dz_k, taken for the earlier of the two."""
-        own = self.symmetric.get(n)
-        if own is None or self._level.get(own) != level:
+        mirror = self.symmetric.get(n)
+        if mirror is None or self._level.get(mirror) != level:
             return result
         for z in list(result):
             other = self._adjoint_of.get(z)
-            peers = self._level.get(z) == level and z.id < own.id
+            peers = self._level.get(z) == level and z.id < mirror.id
             if other is not None and peers and self._depends(other):
-                result[z] = self.local(other, level).get(own, self.g.zero)
+                result[z] = self.local(other, level).get(mirror, self.g.zero)
         return result
 
 

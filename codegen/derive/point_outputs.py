@@ -27,10 +27,10 @@ def outputs(d: Definition, task: str) -> list[Entry]:
     if task != Task.PSEUDO_LOAD:
         by = argument(d, task)
         assert by is not None
-        rates = directional(d.graph, [x.node for x in rows], {by: d.graph.one}, d.given)
+        rates = directional(d.graph, [x.node for x in rows], {by: d.graph.one}, d.prescribed)
         return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
     seeds = {**moved_arguments(d), **moved_unknowns(d, first_rate(d, task))}
-    rates = directional(d.graph, [x.node for x in rows], seeds, d.given)
+    rates = directional(d.graph, [x.node for x in rows], seeds, d.prescribed)
     return rows + [Entry(Slot(False, RATES + k), None, n) for k, n in enumerate(rates)]
 
 
@@ -48,20 +48,20 @@ def at_centroid(form: PointForm, task: str) -> list[Entry]:
     dofs = {k: g.input("dofs", k) for k in range(len(form.all)) if k not in form.centroid}
     if task == Task.TANGENT:
         for x in rows:
-            slopes = gradient(g, x.node, list(dofs.values()), given=d.given)
-            rows = rows + [Entry(x.row, Slot(False, k), slopes[n]) for k, n in dofs.items()]
+            derivatives = gradient(g, x.node, list(dofs.values()), prescribed=d.prescribed)
+            rows = rows + [Entry(x.row, Slot(False, k), derivatives[n]) for k, n in dofs.items()]
     elif task in (Task.PRODUCT, Task.PSEUDO_LOAD, Task.FIELDS_RATE):
         first = first_rate(d, task)
         seeds = {} if task == Task.PRODUCT else moved_arguments(d)
         seeds |= {n: g.input("direction", first + k) for k, n in dofs.items()}
-        rates = directional(g, values, seeds, d.given)
+        rates = directional(g, values, seeds, d.prescribed)
         rows += [Entry(Slot(False, RATES + k), None, n) for k, n in enumerate(rates)]
     return rows
 
 
 def argument(d: Definition, task: str) -> Node | None:
     """The parameter or datum at the point by which a task derives, None if there is none."""
-    places = [("parameters", a.name, k) for k, a in enumerate(d.parameters)]
-    places += [("data", a.name, k) for k, a in enumerate(d.data)]
-    found = [d.graph.input(array, k) for array, n, k in places if derivative_task(n) == task]
-    return found[0] if found else None
+    arguments = [("parameters", a.name, k) for k, a in enumerate(d.parameters)]
+    arguments += [("data", a.name, k) for k, a in enumerate(d.data)]
+    matches = [d.graph.input(array, k) for array, n, k in arguments if derivative_task(n) == task]
+    return matches[0] if matches else None

@@ -60,14 +60,14 @@ def degrees(
             degree[n] = max(inner)
         elif n.op is Op.MUL:
             degree[n] = sum(inner)
-        elif n.op is Op.POW and _whole(n) > 0:
-            degree[n] = _whole(n) * inner[0]
+        elif n.op is Op.POW and _positive_exponent(n) > 0:
+            degree[n] = _positive_exponent(n) * inner[0]
         else:
             degree[n] = ABOVE
     return degree
 
 
-def _whole(power: Node) -> int:
+def _positive_exponent(power: Node) -> int:
     """Exponent of a power if that is a positive integer, else 0."""
     e = power.payload if power.op is Op.POW else None
     return int(e) if isinstance(e, Fraction) and e.denominator == 1 and e > 0 else 0
@@ -108,18 +108,18 @@ def through_invariants(
 ) -> Reduced | None:
     """`roots` through as few quadratic values as suffice; None where none can be saved."""
     search = _Search(g, degrees(roots, linear, constant), frozenset(linear))
-    found = search.run(search.targets(roots))
-    if found is None:
+    reduction = search.run(search.targets(roots))
+    if reduction is None:
         return None
-    recipes, terms, squares = found
+    recipes, terms, squares = reduction
     new: dict[Node, Node] = {}
-    known: dict[int, Node] = {}
+    rebuilt: dict[int, Node] = {}
     for n in reachable(roots):
         if n in recipes:
-            new[n] = recipes[n].cook(g, terms, known)
+            new[n] = recipes[n].cook(g, terms, rebuilt)
         else:
             new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
-        known[n.id] = new[n]
+        rebuilt[n.id] = new[n]
     return Reduced([new[r] for r in roots], new, squares)
 
 
@@ -139,10 +139,10 @@ class _Recipe:
     part: _Quadratic
     row: Mapping[tuple[int, ...], Fraction]
 
-    def cook(self, g: Graph, terms: Sequence[Node], known: Mapping[int, Node]) -> Node:
-        """The value over the new `terms`, with the constants as `known` by their old ids."""
+    def cook(self, g: Graph, terms: Sequence[Node], rebuilt: Mapping[int, Node]) -> Node:
+        """The value over the new `terms`, with the constants as `rebuilt` by their old ids."""
         total = value(g, self.row, terms)
-        factor = value(g, {self.part.constants: self.part.scale}, known)
+        factor = value(g, {self.part.constants: self.part.scale}, rebuilt)
         return g.mul(factor, total)
 
 
@@ -188,12 +188,12 @@ class _Search:
                 _represent(dict(p.shape), 1 if self.degree[t] == 2 else 2, [*basis, *squared])
                 for t, p in zip(solved, parts, strict=True)
             ]
-            found = [row for row in rows if row is not None]
-            if len(found) == len(parts):
+            solutions = [row for row in rows if row is not None]
+            if len(solutions) == len(parts):
                 break
         else:
             return None
-        recipes = {t: _Recipe(p, row) for t, p, row in zip(solved, parts, found, strict=True)}
+        recipes = {t: _Recipe(p, row) for t, p, row in zip(solved, parts, solutions, strict=True)}
         unit = Fraction(1)
         recipes |= {n: _Recipe(q, {(basis.index(q.shape),): unit}) for n, q in fixed.items()}
         inside = {self._nodes[i] for shape in basis for m, _ in shape for i in m}
@@ -281,7 +281,7 @@ class _Search:
         if inverse is not None:
             return inverse
         if n in self.forms or (
-            self.degree[n] == 0 and n.op not in (Op.MUL, Op.NEG) and not _whole(n)
+            self.degree[n] == 0 and n.op not in (Op.MUL, Op.NEG) and not _positive_exponent(n)
         ):
             return {(n.id,): Fraction(1)}
         parts: list[Polynomial] = []
@@ -291,7 +291,7 @@ class _Search:
                 return None
             parts.append(part)
         if n.op in (Op.MUL, Op.POW):
-            factors = parts * _whole(n) if n.op is Op.POW else parts
+            factors = parts * _positive_exponent(n) if n.op is Op.POW else parts
             out = functools.reduce(product, factors)
         else:
             sign = -1 if n.op in (Op.SUB, Op.NEG) else 1
@@ -299,9 +299,9 @@ class _Search:
         return out if len(out) <= LONGEST else None
 
 
-def _without(m: Monomial, taken: Counter[int]) -> Monomial:
+def _without(m: Monomial, removed: Counter[int]) -> Monomial:
     left = Counter(m)
-    left.subtract(taken)
+    left.subtract(removed)
     return tuple(sorted(left.elements()))
 
 
@@ -358,10 +358,10 @@ class Structure:
 
 def linear_forms(d: Definition) -> Structure | None:
     """The potential through linear forms of the unknowns; None where there is nothing to gain."""
-    if d.interpolated or d.given:
+    if d.interpolated or d.prescribed:
         return None
     g = d.graph
-    (root,), kept = strip(g, [d.potential], d.constant)
+    (root,), constants = strip(g, [d.potential], d.constant)
     if _guarded_coefficients(root, d.directions):
         return None
     interface = linear_interface(g, [root], d.directions)
@@ -370,7 +370,7 @@ def linear_forms(d: Definition) -> Structure | None:
     named: dict[Node, Node] = {}
     replacement = {z: _named(g, value, named) for z, value in interface.rewritten.items()}
     (root,), new = substitute(g, [root], replacement)
-    constant = _left(new, (kept[c] for c in d.constant if c in kept))
+    constant = _left(new, (constants[c] for c in d.constant if c in constants))
     return Structure(root, constant, interface, tuple(named.values()))
 
 
@@ -388,8 +388,8 @@ def quadratic_values(d: Definition, s: Structure) -> Structure:
         constant = _left(reduced.images, s.constant)
         (root,), squares = reduced.roots, reduced.squares
         return replace(s, root=root, constant=constant, squares=squares, invariants=True)
-    found = quadratic_interface([s.root], s.forms, s.constant)
-    named = {q: g.name(f"q{k}", q) for k, q in enumerate(found)}
+    reduction = quadratic_interface([s.root], s.forms, s.constant)
+    named = {q: g.name(f"q{k}", q) for k, q in enumerate(reduction)}
     (root,), new = substitute(g, [s.root], named)
     constant = _left(new, s.constant)
     return replace(s, root=root, constant=constant, squares=tuple(named.values()))

@@ -32,8 +32,8 @@ def tasks(d: Definition) -> list[str]:
         offered.append(Task.PRODUCT)
     if d.tasks is not None:
         offered = [t for t in offered if t in d.tasks]
-    asked = {Task.PSEUDO_LOAD: d.pseudo_load, Task.FIELDS_RATE: d.fields_rate}
-    offered += [task for task, wanted in asked.items() if wanted]
+    optional = {Task.PSEUDO_LOAD: d.pseudo_load, Task.FIELDS_RATE: d.fields_rate}
+    offered += [task for task, requested in optional.items() if requested]
     return offered + [derivative_task(name) for name, _ in d.derivatives]
 
 
@@ -55,7 +55,7 @@ def differentiated(task: str) -> bool:
     return task not in (Task.ENERGY, *AT_POINTS)
 
 
-def variants(d: Definition, task: str, found: Structure | None) -> Iterator[Variant]:
+def variants(d: Definition, task: str, structure: Structure | None) -> Iterator[Variant]:
     """The outputs of a task by different chain rules: passes will tell which is the cheapest."""
     if task == Task.FIELDS_RATE:
         values = [Entry(Slot(False, k), None, n) for k, (_, n) in enumerate(d.fields)]
@@ -67,30 +67,34 @@ def variants(d: Definition, task: str, found: Structure | None) -> Iterator[Vari
             [Entry(Slot(False, k), None, n) for k, n in enumerate(nodes)],
         )
     elif task in (Task.RESIDUAL, Task.TANGENT):
-        yield from _rules(d, task, found)
+        yield from _rules(d, task, structure)
     elif task == Task.PSEUDO_LOAD:
-        for rule in _rules(d, Task.RESIDUAL, found):
+        for rule in _rules(d, Task.RESIDUAL, structure):
             yield Variant(f"along a variation, {rule.rule}", _rates(d, task, rule.entries))
     else:
-        residual = next(_rules(d, Task.RESIDUAL, found))
+        residual = next(_rules(d, Task.RESIDUAL, structure))
         yield Variant(f"along one direction, {residual.rule}", _rates(d, task, residual.entries))
 
 
-def _rules(d: Definition, task: str, found: Structure | None) -> Iterator[Variant]:
-    if found is not None:
-        ways = {
-            "level by level": invariant_chain_rule.by_levels(d, found),
-            "by slopes of what the potential sees": invariant_chain_rule.by_slopes(d, found),
+def _rules(d: Definition, task: str, structure: Structure | None) -> Iterator[Variant]:
+    if structure is not None:
+        rules = {
+            "level by level": invariant_chain_rule.by_levels(d, structure),
+            "by slopes of what the potential sees": invariant_chain_rule.by_slopes(d, structure),
         }
-        for rule, way in ways.items():
-            yield Variant(rule, way.residual() + (way.tangent() if task == Task.TANGENT else []))
-    if found is None or len(reachable([d.potential])) <= SMALL:
+        for rule, chain_rule in rules.items():
+            yield Variant(
+                rule, chain_rule.residual() + (chain_rule.tangent() if task == Task.TANGENT else [])
+            )
+    if structure is None or len(reachable([d.potential])) <= SMALL:
         yield Variant("through the values that the page names", _plain(d, task))
 
 
 def _plain(d: Definition, task: str) -> list[Entry]:
     """Reverse mode, and forward over it through the interfaces that the model names."""
-    adjoint = gradient(d.graph, d.potential, d.directions, constant=d.constant, given=d.given)
+    adjoint = gradient(
+        d.graph, d.potential, d.directions, constant=d.constant, prescribed=d.prescribed
+    )
     slots = _slots(d)
     rows = [Entry(s, None, adjoint[u]) for s, u in zip(slots, d.directions, strict=True)]
     return rows + (_tangent(d, rows, slots, adjoint) if task == Task.TANGENT else [])
@@ -109,7 +113,7 @@ def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
     else:
         by_task = {derivative_task(name): node for name, node in d.derivatives}
         seeds = {by_task[task]: g.one}
-    rates = directional(g, [x.node for x in rows], seeds, d.given)
+    rates = directional(g, [x.node for x in rows], seeds, d.prescribed)
     return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
 
 
@@ -133,9 +137,9 @@ def moved_arguments(d: Definition) -> dict[Node, Node]:
         "data": len(d.data),
         "parameters": len(d.parameters),
     }
-    places = ((array, k) for array, width in widths.items() for k in range(width))
+    inputs = ((array, k) for array, width in widths.items() for k in range(width))
     g = d.graph
-    seeds = {g.input(*place): g.input("direction", n) for n, place in enumerate(places)}
+    seeds = {g.input(*source): g.input("direction", n) for n, source in enumerate(inputs)}
     half = len(d.point_data) // 2 if d.point_rates else 0
     for k, varying in product(range(half), (False, True)):
         value = g.input("point data", k, varying=varying)
@@ -158,7 +162,7 @@ def _tangent(
         d.directions,
         d.interface,
         symmetric=mirror,
-        given=d.given,
+        prescribed=d.prescribed,
         certain=Certain([d.potential]),
     )
     entries: dict[tuple[int, int], Node] = {}

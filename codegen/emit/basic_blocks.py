@@ -27,12 +27,12 @@ def arranged_plan(g: Graph, plan: Schedule, roots: Sequence[Node]) -> Schedule:
     work = _Runs(g, plan, roots)
     stages, computed = [], set[Node]()
     for stage in plan.stages:
-        before = work.block(stage.before, computed)
+        preamble = work.block(stage.preamble, computed)
         loop = stage.loop
         if loop is not None:
             loop = replace(loop, body=work.block(loop.body, set(computed)))
             computed.update(loop.sums)
-        stages.append(replace(stage, before=before, loop=loop))
+        stages.append(replace(stage, preamble=preamble, loop=loop))
     return replace(plan, stages=tuple(stages))
 
 
@@ -49,7 +49,7 @@ def _runs(block: Sequence[Statement]) -> Iterator[list[Statement]]:
             yield from ([s] for s in row)
 
 
-def _groups(run: Sequence[Node], ends: Collection[Node]) -> list[list[Node]]:
+def _groups(run: Sequence[Node], outputs: Collection[Node]) -> list[list[Node]]:
     """The ends in a run, together with those that hang on the same values from outside it."""
     hangs: dict[Node, int] = {}
     bit: dict[Node, int] = {}
@@ -60,33 +60,33 @@ def _groups(run: Sequence[Node], ends: Collection[Node]) -> list[list[Node]]:
         hangs[n] = reduce(or_, (hangs.get(a, 0) | bit.get(a, 0) for a in n.args), 0)
     groups: dict[int, list[Node]] = {}
     for n in run:
-        if n in ends:
+        if n in outputs:
             groups.setdefault(hangs[n], []).append(n)
     return list(groups.values())
 
 
 class _Runs:
-    """`ends` are the values that something outside their own run uses."""
+    """`outputs` are the values that something outside their own run uses."""
 
     def __init__(self, g: Graph, plan: Schedule, roots: Sequence[Node]) -> None:
         self.g = g
-        self.place: dict[Node, int] = {}
-        self.ends = set(roots)
+        self.run_of: dict[Node, int] = {}
+        self.outputs = set(roots)
         self.count = 0
-        blocks = [b for s in plan.stages for b in (s.before, s.loop.body if s.loop else [])]
+        blocks = [b for s in plan.stages for b in (s.preamble, s.loop.body if s.loop else [])]
         for block in blocks:
             self._number(block)
         for block in blocks:
             self._use(block)
         for loop in (s.loop for s in plan.stages if s.loop):
-            self.ends.update(loop.outputs, (s.args[0] for s in loop.sums))
+            self.outputs.update(loop.outputs, (s.args[0] for s in loop.sums))
 
     def _number(self, block: Sequence[Statement]) -> None:
         for run in _runs(block):
             self.count += 1
             for s in run:
                 if isinstance(s, Node):
-                    self.place[s] = self.count
+                    self.run_of[s] = self.count
                 elif isinstance(s, If):
                     self._number(s.then)
                     self._number(s.otherwise)
@@ -94,10 +94,10 @@ class _Runs:
     def _use(self, block: Iterable[Statement]) -> None:
         for s in block:
             if isinstance(s, Node):
-                at = self.place[s]
-                self.ends.update(a for a in s.args if self.place.get(a) != at)
+                at = self.run_of[s]
+                self.outputs.update(a for a in s.args if self.run_of.get(a) != at)
             elif isinstance(s, If):
-                self.ends.update([s.condition], *(n.args for n in s.merged))
+                self.outputs.update([s.condition], *(n.args for n in s.merged))
                 self._use(s.then)
                 self._use(s.otherwise)
 
@@ -121,17 +121,17 @@ class _Runs:
         after the other they stay in the fastest memory; the scheduler, which sees few registers
         and no plan, has all of them under way at once.
         """
-        groups = _groups(run, self.ends)
+        groups = _groups(run, self.outputs)
         if len(run) < PART * len(groups):
             return [list(run)]
         parts, part_of = [], dict[Node, int]()
-        place = {n: k for k, n in enumerate(run)}
+        position = {n: k for k, n in enumerate(run)}
         for k, some in enumerate(groups):
-            found = reachable(some, stop=lambda n: n not in place or n in part_of)
-            new = [n for n in found if n in place and n not in part_of]
+            below = reachable(some, stop=lambda n: n not in position or n in part_of)
+            new = [n for n in below if n in position and n not in part_of]
             part_of.update(dict.fromkeys(new, k))
-            parts.append(sorted(new, key=place.__getitem__))
-        self.ends.update(a for n, k in part_of.items() for a in n.args if part_of.get(a, k) != k)
+            parts.append(sorted(new, key=position.__getitem__))
+        self.outputs.update(a for n, k in part_of.items() for a in n.args if part_of.get(a, k) != k)
         return parts
 
     def _branch(self, s: If, computed: set[Node]) -> If:
@@ -139,12 +139,12 @@ class _Runs:
         return If(s.condition, s.merged, *sides)
 
     def _arranged(self, nodes: Sequence[Node], computed: set[Node]) -> Iterator[Statement]:
-        ends = [n for n in nodes if n in self.ends]
-        new, order = arranged(self.g, ends, nodes, computed)
-        renamed = {b: a for a, b in zip(ends, new, strict=True) if a is not b}
+        outputs = [n for n in nodes if n in self.outputs]
+        new, order = arranged(self.g, outputs, nodes, computed)
+        renamed = {b: a for a, b in zip(outputs, new, strict=True) if a is not b}
         free = [Same(a, b) for b, a in renamed.items() if b.op in FREE or b in computed]
         yield from free
-        computed.update(order, ends)
+        computed.update(order, outputs)
         for n in order:
             yield n
             if n in renamed:

@@ -30,8 +30,8 @@ def functions(d: Definition, task: str, body: str) -> str:
     """C text of the function of a group with this body, and of the batch."""
     name = abi.function_name(d.name, task)
     wide = widths(d, task)
-    given = ", ".join([name, *wide.values()])
-    public = f"SOFTEHL_BATCH({given})"
+    arguments = ", ".join([name, *wide.values()])
+    public = f"SOFTEHL_BATCH({arguments})"
     if task == abi.Task.TANGENT and len(d.unknowns) > WIDE:
-        public = f"SOFTEHL_WIDE_BATCH({given})"
+        public = f"SOFTEHL_WIDE_BATCH({arguments})"
     return f"SOFTEHL_GROUP({name})\n{{\n    SOFTEHL_IDLE;\n{body}\n}}\n{public}\n"

@@ -43,32 +43,32 @@ def _declared(statements: Iterable[str]) -> Iterator[Sequence[str]]:
     kind = ""
     names: list[str] = []
     for s in statements:
-        found = _DECLARED.fullmatch(s)
-        if names and (found is None or found[1] != kind):
+        declaration = _DECLARED.fullmatch(s)
+        if names and (declaration is None or declaration[1] != kind):
             yield _joined(kind, names)
             names = []
-        if found is None:
+        if declaration is None:
             yield [s]
         else:
-            kind = found[1]
-            names.append(found[2])
+            kind = declaration[1]
+            names.append(declaration[2])
     if names:
         yield _joined(kind, names)
 
 
 def _joined(kind: str, names: Sequence[str]) -> list[str]:
-    first, *rest = [f"{name}," for name in names[:-1]] + [f"{names[-1]};"]
-    return [f"{kind} {first}", *rest]
+    first, *others = [f"{name}," for name in names[:-1]] + [f"{names[-1]};"]
+    return [f"{kind} {first}", *others]
 
 
 def _lines(indent: str, statements: Iterable[Sequence[str]]) -> list[str]:
     out: list[str] = []
     alone = True
     for pieces in statements:
-        before, alone = alone, len(pieces) > 1
+        previous, alone = alone, len(pieces) > 1
         for k, piece in enumerate(pieces):
-            apart = not k and (alone or before)
-            if out and not apart and len(out[-1]) + 1 + len(piece) <= WIDTH:
+            separate = not k and (alone or previous)
+            if out and not separate and len(out[-1]) + 1 + len(piece) <= WIDTH:
                 out[-1] += f" {piece}"
             else:
                 out.append(f"{indent}{'    ' if k else ''}{piece}")
@@ -88,16 +88,16 @@ def used_once(
     """
     uses = Counter(outputs)
     for stage in plan.stages:
-        _count(uses, stage.before)
+        _count(uses, stage.preamble)
         if stage.loop is not None:
             _count(uses, stage.loop.body)
             uses.update(s.args[0] for s in stage.loop.sums)
-    near = set(stored)
+    inlinable = set(stored)
     for block, sums in _blocks(plan):
-        here = {s for s in block if isinstance(s, Node)}
-        near |= here & {s.args[0] for s in sums}
-        near |= {a for n in here if n.op is not Op.CALL for a in n.args if a in here}
-    return frozenset(n for n in near if uses[n] == 1 and n.op in ARITHMETIC)
+        nodes = {s for s in block if isinstance(s, Node)}
+        inlinable |= nodes & {s.args[0] for s in sums}
+        inlinable |= {a for n in nodes if n.op is not Op.CALL for a in n.args if a in nodes}
+    return frozenset(n for n in inlinable if uses[n] == 1 and n.op in ARITHMETIC)
 
 
 def _count(uses: Counter[Node], block: Iterable[Statement]) -> None:
@@ -109,7 +109,7 @@ def _count(uses: Counter[Node], block: Iterable[Statement]) -> None:
 def _blocks(plan: Schedule) -> Iterator[tuple[list[Statement], tuple[Node, ...]]]:
     """Every block of statements, with the sums that a loop adds up from it."""
     for stage in plan.stages:
-        yield from ((b, ()) for b in _nested(stage.before))
+        yield from ((b, ()) for b in _nested(stage.preamble))
         if stage.loop is not None:
             yield stage.loop.body, stage.loop.sums
             yield from ((b, ()) for s in stage.loop.body if isinstance(s, If) for b in _sides(s))
@@ -276,9 +276,9 @@ class Printer:
 
     def operand(self, n: Node, k: int) -> str:
         """The k-th operand of an expression."""
-        a, places = n.args[k], _BARE.get(n.op)
-        loose = places is None or a.op in places[k]
-        return self.bare(a) if loose else self.ref(a)
+        a, bare = n.args[k], _BARE.get(n.op)
+        parenthesised = bare is None or a.op in bare[k]
+        return self.bare(a) if parenthesised else self.ref(a)
 
     def branch(self, depth: int, s: If) -> None:
         names = [self.fresh(n) for n in s.merged]

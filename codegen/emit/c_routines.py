@@ -177,7 +177,7 @@ class Body:
         plan = schedule(self.roots)
         p.read(plan, self.roots)
         for stage in plan.stages:
-            p.block(depth, stage.before)
+            p.block(depth, stage.preamble)
         for target, n in zip(targets, self.roots, strict=True):
             p.line(depth, f"{target} = {p.value(n)};")
         return p.text()
@@ -186,9 +186,9 @@ class Body:
 def newton_values(r: Newton) -> tuple[list[Node], list[str]]:
     """Values of every step of a local iteration, and the variables that take them."""
     n, first = r.outputs, r.inputs - r.outputs
-    slopes = [a for rows in (r.by_local, r.by_external) for row in rows for a in row]
+    derivatives = [a for rows in (r.by_local, r.by_external) for row in rows for a in row]
     targets = [*(f"g[{i}]" for i in range(n)), *(f"A[{i}]" for i in range(n * n))]
-    return [*r.equations, *slopes], targets + [f"B[{i}]" for i in range(n * first)]
+    return [*r.equations, *derivatives], targets + [f"B[{i}]" for i in range(n * first)]
 
 
 def rounding(r: Newton) -> str:

@@ -16,16 +16,16 @@ ONE_LANE = "#define SOFTEHL_LANES 1\n"
 def source(
     definition: Definition,
     functions: Iterable[str],
-    before: Iterable[str] = (),
+    preamble: Iterable[str] = (),
     *,
     single: bool = False,
 ) -> str:
-    """The C file of a kernel family; `before` are the routines that its functions call.
+    """The C file of a kernel family; `preamble` are the routines that its functions call.
 
     single: with one lane, whatever the compiler knows.
     """
     include = f'{ONE_LANE if single else ""}#include "{HEADER}"'
-    return "\n".join([_banner(definition), include, "", *before, *functions])
+    return "\n".join([_banner(definition), include, "", *preamble, *functions])
 
 
 def _banner(d: Definition) -> str:

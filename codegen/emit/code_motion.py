@@ -58,7 +58,7 @@ class Loop:
 class Stage:
     """Values that do not vary with the point, then a loop (or none)."""
 
-    before: list[Statement]
+    preamble: list[Statement]
     loop: Loop | None
 
 
@@ -81,17 +81,19 @@ def schedule(roots: Sequence[Node]) -> Schedule:
     stages, once, looped = [], 0, 0
     for k in range(top + 1):
         fixed = [n for n in nodes if not n.varying and level[n] == k and _computed(n)]
-        before = place(depth_first(fixed, roots), fixed_roots(fixed, nodes, roots))
+        preamble = place_in_branches(depth_first(fixed, roots), fixed_roots(fixed, nodes, roots))
         feeds = tuple(s for s in sums if level[s] == k + 1)
         outputs = tuple(r for r in varying if level[r] == k)
-        ends = [*(s.args[0] for s in feeds), *outputs]
+        loop_roots = [*(s.args[0] for s in feeds), *outputs]
         loop = None
         once += sum(n.op is not Op.ITEM for n in fixed)
-        if ends:
-            inside = [n for n in _in_loop(ends) if _computed(n)]
-            loop = Loop(place(depth_first(inside, ends), set(ends)), feeds, outputs)
+        if loop_roots:
+            inside = [n for n in _in_loop(loop_roots) if _computed(n)]
+            loop = Loop(
+                place_in_branches(depth_first(inside, loop_roots), set(loop_roots)), feeds, outputs
+            )
             looped += sum(n.op is not Op.ITEM for n in inside) + len(feeds)
-        stages.append(Stage(before, loop))
+        stages.append(Stage(preamble, loop))
     return Schedule(tuple(stages), once, looped)
 
 
@@ -105,7 +107,7 @@ def is_straight(plan: Schedule) -> bool:
     return (
         len(plan.stages) == 1
         and plan.stages[0].loop is None
-        and all(isinstance(s, Node) and s.op is not Op.CALL for s in plan.stages[0].before)
+        and all(isinstance(s, Node) and s.op is not Op.CALL for s in plan.stages[0].preamble)
     )
 
 
@@ -121,9 +123,9 @@ def depth_first(nodes: Sequence[Node], roots: Sequence[Node]) -> list[Node]:
         need[n] = max([1, *(r + k for k, r in enumerate(ranks))])
     order: list[Node] = []
     seen: set[Node] = set()
-    ends = set(roots)
-    rest = [n for n in reversed(nodes) if n not in ends]
-    stack = [*rest, *(r for r in reversed(roots) if r in inside)]
+    root_set = set(roots)
+    inner = [n for n in reversed(nodes) if n not in root_set]
+    stack = [*inner, *(r for r in reversed(roots) if r in inside)]
     opened: set[Node] = set()
     while stack:
         n = stack[-1]
@@ -144,8 +146,8 @@ def _computed(n: Node) -> bool:
     return n.op not in (Op.CONST, Op.PI, Op.INPUT, Op.NAME, Op.SUM)
 
 
-def _in_loop(ends: Iterable[Node]) -> list[Node]:
-    return [n for n in reachable(ends, stop=lambda n: not n.varying) if n.varying]
+def _in_loop(roots: Iterable[Node]) -> list[Node]:
+    return [n for n in reachable(roots, stop=lambda n: not n.varying) if n.varying]
 
 
 def _levels(nodes: Sequence[Node]) -> dict[Node, int]:
@@ -169,12 +171,12 @@ Path = tuple[tuple[int, bool], ...]
 class _Placement:
     """Regions of one straight-line block: the lowest common branch side of all users."""
 
-    def __init__(self, nodes: Sequence[Node], ends: set[Node], group: dict[Node, int]) -> None:
+    def __init__(self, nodes: Sequence[Node], roots: set[Node], group: dict[Node, int]) -> None:
         self.group = group
         self.path: dict[Node, Path] = {}
         uses: dict[Node, list[Path]] = {n: [] for n in nodes}
         for n in sorted(nodes, key=lambda n: -n.id):
-            paths = [*uses[n], ()] if n in ends else uses[n]
+            paths = [*uses[n], ()] if n in roots else uses[n]
             self.path[n] = _common(paths)
             for k, a in enumerate(n.args):
                 if a in uses:
@@ -188,9 +190,9 @@ class _Placement:
 
 
 def _common(paths: Sequence[Path]) -> Path:
-    first, *rest = paths
+    first, *others = paths
     length = len(first)
-    for p in rest:
+    for p in others:
         length = min(
             length,
             next(
@@ -201,12 +203,12 @@ def _common(paths: Sequence[Path]) -> Path:
     return first[:length]
 
 
-def place(nodes: Sequence[Node], ends: set[Node]) -> list[Statement]:
+def place_in_branches(nodes: Sequence[Node], roots: set[Node]) -> list[Statement]:
     """Statements of one block in an order that computes operands first."""
     try:
-        return _place(nodes, ends, _grouped(nodes))
+        return _place_groups(nodes, roots, _grouped(nodes))
     except _CycleError:
-        return _place(nodes, ends, {n: n.id for n in nodes if n.op is Op.BRANCH})
+        return _place_groups(nodes, roots, {n: n.id for n in nodes if n.op is Op.BRANCH})
 
 
 class _CycleError(Exception):
@@ -229,8 +231,10 @@ def _grouped(nodes: Sequence[Node]) -> dict[Node, int]:
     return group
 
 
-def _place(nodes: Sequence[Node], ends: set[Node], group: dict[Node, int]) -> list[Statement]:
-    placement = _Placement(nodes, ends, group)
+def _place_groups(
+    nodes: Sequence[Node], roots: set[Node], group: dict[Node, int]
+) -> list[Statement]:
+    placement = _Placement(nodes, roots, group)
     members: dict[Path, list[Node]] = {}
     for n in nodes:
         members.setdefault(placement.path[n], []).append(n)

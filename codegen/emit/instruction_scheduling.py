@@ -92,10 +92,10 @@ def _pieces(roots: Sequence[Node], inside: Collection[Node] | None) -> list[_Pie
     for n in nodes:
         uses.update(n.args)
         user.update(dict.fromkeys(n.args, n))
-    kept, own = set(roots), set(nodes)
+    outputs, block = set(roots), set(nodes)
 
     def inner(n: Node) -> bool:
-        alone = n in own and uses[n] == 1 and n not in kept and user[n].op in ADDITIONS
+        alone = n in block and uses[n] == 1 and n not in outputs and user[n].op in ADDITIONS
         return alone and (n.op is Op.MUL or (n.op in ADDITIONS and not first_difference(n)))
 
     def terms(total: _Sum) -> list[_Piece]:
@@ -138,18 +138,18 @@ class _Scheduler:
     def __post_init__(self) -> None:
         self._window = max(8, CANDIDATES // max(len(self.pieces), 1))
         self._later: list[tuple[float, _Piece]] = []
-        own = {p.node if p.total is None else p.total.head for p in self.pieces}
-        self.printed.update(a for p in self.pieces for a in p.fetched if a not in own)
+        heads = {p.node if p.total is None else p.total.head for p in self.pieces}
+        self.printed.update(a for p in self.pieces for a in p.fetched if a not in heads)
         # how early the model's author, or the chain rule, wrote a value
         ids = sorted(self.pieces, key=lambda p: p.node.id)
-        self._place = {p: k / len(ids) for k, p in enumerate(ids)}
+        self._position = {p: k / len(ids) for k, p in enumerate(ids)}
         self._arrival: dict[Node | _Sum, int] = {}
         self._waiting: dict[Node, list[_Piece]] = {}
         self._missing: dict[_Piece, int] = {}
         self._uses: Counter[Node] = Counter()
         for p in self.pieces:
             self._uses.update(p.fetched)
-            missing = [a for a in p.fetched if a in own]
+            missing = [a for a in p.fetched if a in heads]
             self._missing[p] = len(missing)
             for a in missing:
                 self._waiting.setdefault(a, []).append(p)
@@ -163,7 +163,7 @@ class _Scheduler:
         elif len(self.ready) < self._window:
             self.ready[p] = None
         else:
-            heappush(self._later, (self._place[p], p))
+            heappush(self._later, (self._position[p], p))
 
     def step(self) -> None:
         """Take the cheapest piece that is ready."""
@@ -187,7 +187,7 @@ class _Scheduler:
             self.ready[heappop(self._later)[1]] = None
 
     def _cost(self, p: _Piece) -> float:
-        cost, arrival = DRIFT * self._place[p], self.clock
+        cost, arrival = DRIFT * self._position[p], self.clock
         for a in p.fetched:
             if a not in self.registers:
                 cost += 1.0

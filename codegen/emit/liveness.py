@@ -22,7 +22,7 @@ def peak_live(plan: Schedule) -> int:
     for stage in reversed(plan.stages):
         if stage.loop is not None:
             live = walk.loop(stage.loop, live)
-        live = walk.block(stage.before, live)
+        live = walk.block(stage.preamble, live)
     return walk.peak
 
 
@@ -60,9 +60,9 @@ class _Backwards:
         once = _Backwards()
         through = live | set(loop.sums)
         summed = _temporaries(s.args[0] for s in loop.sums)
-        ends = summed | _temporaries(loop.outputs)
-        read = once.block(loop.body, through | ends)
-        again = self.block(loop.body, self.seen(read | through | ends))
+        loop_results = summed | _temporaries(loop.outputs)
+        read = once.block(loop.body, through | loop_results)
+        again = self.block(loop.body, self.seen(read | through | loop_results))
         return self.seen(again | read | through) - set(loop.sums)
 
     def seen(self, live: frozenset[Node]) -> frozenset[Node]:

@@ -21,17 +21,17 @@ from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 
 
-def gather(p: Printer, depth: int, value: str, array: str, before: int = 0) -> None:
+def gather(p: Printer, depth: int, value: str, array: str, offset: int = 0) -> None:
     """Values and xi-derivatives of the interpolated fields at the point.
 
-    before: entries of the array that stand before those of the dofs.
+    offset: entries of the array that stand before those of the dofs.
     """
     names = [f"{value}{k}" for k in range(p.d.components)]
     unknowns = p.output.format(array)
     p.line(depth, f"{p.kind} {', '.join(f'{name} = {p.zero}' for name in names)};")
     p.line(depth, "for (ptrdiff_t i = 0; i < modes; ++i) {")
     for name, shape in zip(names, _shapes(p.d, "i"), strict=True):
-        p.line(depth + 1, f"{name} += {shape} * {unknowns}[{before + len(p.d.unknowns)} + i];")
+        p.line(depth + 1, f"{name} += {shape} * {unknowns}[{offset + len(p.d.unknowns)} + i];")
     p.line(depth, "}")
     p.line(depth, f"{', '.join(f'(void){name}' for name in names)};")
 
@@ -68,8 +68,8 @@ def scatter(p: Printer, depth: int, task: str, entries: Sequence[Entry]) -> None
             p.line(depth + 1, f"const {p.kind} r{c} = {right};")
         p.line(depth + 1, "for (ptrdiff_t j = 0; j < modes; ++j)")
         products = " + ".join(f"r{c} * {shape}" for c, shape in enumerate(_shapes(p.d, "j")))
-        place = f"[({direct} + i) * {dofs_expression(p.d)} + {direct} + j]"
-        p.line(depth + 2, f"{p.output.format('K')}{place} += {products};")
+        entry = f"[({direct} + i) * {dofs_expression(p.d)} + {direct} + j]"
+        p.line(depth + 2, f"{p.output.format('K')}{entry} += {products};")
     p.line(depth, "}")
 
 
@@ -129,12 +129,12 @@ class _Group:
         self._loads()
         self.stores.start()
         for stage in plan.stages:
-            for s in stage.before:
+            for s in stage.preamble:
                 p.block(1, [s])
-                self.stores.known(_values(s))
+                self.stores.mark_computed(_values(s))
             if stage.loop is not None:
                 self._loop(stage.loop)
-                self.stores.known(stage.loop.sums)
+                self.stores.mark_computed(stage.loop.sums)
         self._finish()
 
     def _loads(self) -> None:
@@ -232,11 +232,11 @@ class _Group:
             if self.task == abi.Task.FIELDS_RATE:
                 gather(p, 2, "tp", "t", design_width(d))
         self._body(loop)
-        here = [x for x in self.entries if x.node in loop.outputs]
-        if here and self.task in abi.AT_POINTS:
-            self._fields(here)
-        elif here:
-            scatter(p, 2, self.task, here)
+        loop_entries = [x for x in self.entries if x.node in loop.outputs]
+        if loop_entries and self.task in abi.AT_POINTS:
+            self._fields(loop_entries)
+        elif loop_entries:
+            scatter(p, 2, self.task, loop_entries)
         p.line(1, "}")
 
     def _body(self, loop: Loop) -> None:
@@ -312,17 +312,17 @@ def added_at_once(loop: Loop) -> dict[Node, list[tuple[Node, str, Node]]]:
     used += [*loop.outputs, *(s.args[0] for s in loop.sums)]
     uses = Counter(now.get(a, a) for a in used)
     plain = {s for s in loop.body if isinstance(s, Node)}
-    found: dict[Node, list[tuple[Node, str, Node]]] = {}
+    sums: dict[Node, list[tuple[Node, str, Node]]] = {}
     for s in loop.sums:
         n: Node | None = now.get(s.args[0], s.args[0])
         while n is not None and n in plain and n.op in ADDITIONS and uses[n] == 1:
             signs = "+", "+" if n.op is Op.ADD else "-"
             first = [k for k in range(2) if signs[k] == "+" and n.args[k].op in ADDITIONS]
             inner = [k for k in first if n.args[k] in plain and uses[n.args[k]] == 1]
-            rest = [k for k in range(2) if not inner or k != inner[0]]
-            found[n] = [(s, signs[k], n.args[k]) for k in rest]
+            others = [k for k in range(2) if not inner or k != inner[0]]
+            sums[n] = [(s, signs[k], n.args[k]) for k in others]
             n = n.args[inner[0]] if inner else None
-    return found
+    return sums
 
 
 def _values(s: Statement) -> Sequence[Node]:
@@ -343,8 +343,8 @@ class _Stores:
 
     def once(self) -> list[Node]:
         """Values that stand at one place."""
-        places = Counter(n for _, nodes in self.targets for n in nodes)
-        return [n for n, count in places.items() if count == 1]
+        uses = Counter(n for _, nodes in self.targets for n in nodes)
+        return [n for n, count in uses.items() if count == 1]
 
     def start(self) -> None:
         """Print what is known from the beginning."""
@@ -356,7 +356,7 @@ class _Stores:
             if not needed:
                 self._print(k)
 
-    def known(self, nodes: Iterable[Node]) -> None:
+    def mark_computed(self, nodes: Iterable[Node]) -> None:
         """Print the groups that were waiting for the last of `nodes`."""
         for n in nodes:
             for k in self.waiting.pop(n, []):

@@ -116,9 +116,9 @@ class LanePrinter(Printer):
         """Run a routine for the lanes that want it; lanes in which it fails are remembered."""
         operands = ", ".join(map(self.value, n.args)) or self.zero
         name = f"{abi.PREFIX}_{self.d.name}_{routine.name}_lanes"
-        wanted = self.active or "softehl_mask(1)"
+        mask = self.active or "softehl_mask(1)"
         self.line(depth, f"V {self.fresh(n)}[{routine.outputs}];")
-        self.line(depth, f"{name}({wanted}, (const V[]){{{operands}}}, {self.ref(n)}, &failed);")
+        self.line(depth, f"{name}({mask}, (const V[]){{{operands}}}, {self.ref(n)}, &failed);")
 
     def branch(self, depth: int, s: If) -> None:
         if self.is_scalar(s.condition):
@@ -131,33 +131,35 @@ class LanePrinter(Printer):
                 a, b = (self.value(x) for x in n.args[1:])
                 self.line(depth, f"const V {name} = softehl_blend({condition}, {a}, {b});")
             return
-        known = {n: next((k for k in (2, 1) if self._known(n.args[k])), 0) for n in s.merged}
+        constant_side = {
+            n: next((k for k in (2, 1) if self._is_constant(n.args[k])), 0) for n in s.merged
+        }
         for n, name in zip(s.merged, names, strict=True):
-            start = self.value(n.args[known[n]]) if known[n] else self.zero
+            start = self.value(n.args[constant_side[n]]) if constant_side[n] else self.zero
             self.line(depth, f"V {name} = {start};")
         for k, sign, inner in ((1, "", s.then), (2, "~", s.otherwise)):
-            taken = [n for n in s.merged if known[n] != k]
-            if taken:
-                self._side(depth, taken, k, f"{sign}{condition}", inner)
+            assigned = [n for n in s.merged if constant_side[n] != k]
+            if assigned:
+                self._side(depth, assigned, k, f"{sign}{condition}", inner)
 
-    def _known(self, n: Node) -> bool:
+    def _is_constant(self, n: Node) -> bool:
         """True for a value that stands before what is printed next."""
         return n.op in FREE or n in self.names or n in self.inside
 
     def _side(
-        self, depth: int, taken: Sequence[Node], k: int, chosen: str, inner: Sequence[Statement]
+        self, depth: int, assigned: Sequence[Node], k: int, mask: str, inner: Sequence[Statement]
     ) -> None:
         """One side of a branch, for the lanes that want it; the others keep what they have."""
-        before = self.active
+        outer = self.active
         self.temporaries += 1
         self.active = f"m{self.temporaries}"
-        both = f"{chosen} & {before}" if before else chosen
+        both = f"{mask} & {outer}" if outer else mask
         self.line(depth, f"const M {self.active} = {both};")
         self.line(depth, f"if (softehl_any({self.active})) {{")
         self.block(depth + 1, inner)
-        for n in taken:
+        for n in assigned:
             name, value = self.names[n], self.value(n.args[k])
             blend = f"softehl_blend({self.active}, {value}, {name})"
             self.line(depth + 1, f"{name} = {blend};")
         self.line(depth, "}")
-        self.active = before
+        self.active = outer

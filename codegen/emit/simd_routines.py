@@ -16,9 +16,9 @@ from softehl.codegen.graph.routines import Inverse, Isotropic, Newton
 from softehl.codegen.language.definition import Definition
 
 
-def texts(d: Definition, wanted: Iterable[Routine]) -> list[str]:
+def texts(d: Definition, routines: Iterable[Routine]) -> list[str]:
     """C functions of the routines and what they need, each once, callees first."""
-    return c_routines.texts(d, wanted, _text)
+    return c_routines.texts(d, routines, _text)
 
 
 def _text(d: Definition, r: Routine) -> list[str]:

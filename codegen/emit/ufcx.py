@@ -28,16 +28,16 @@ def tasks(d: Definition, offered: Iterable[str]) -> list[str]:
             "needs a fixed number, use simd or scalar"
         )
     if (d.nodes, d.rule.dimension) not in abi.VERTEX_ORDER:
-        known = ", ".join(f"{n} in {k}-D" for n, k in abi.VERTEX_ORDER)
+        supported = ", ".join(f"{n} in {k}-D" for n, k in abi.VERTEX_ORDER)
         raise abi.TargetError(
             f"{d.name} has {d.nodes} nodes and a rule in {d.rule.dimension}-D; DOLFINx has "
-            f"Lagrange elements of as many nodes as {known}: choose one of them, or use simd or "
-            "scalar"
+            f"Lagrange elements of as many nodes as {supported}: choose one of them, or use simd "
+            "or scalar"
         )
     return [t for t in offered if t not in _NOT_OFFERED]
 
 
-def chosen(entries: Sequence[Entry], task: str) -> list[Entry]:
+def task_entries(entries: Sequence[Entry], task: str) -> list[Entry]:
     """Outputs of one form: the matrix alone for the tangent."""
     return [x for x in entries if task != abi.Task.TANGENT or x.column is not None]
 
@@ -47,7 +47,7 @@ def vertices(d: Definition) -> tuple[int, ...]:
     return abi.VERTEX_ORDER[d.nodes, d.rule.dimension]
 
 
-def places(d: Definition) -> list[int]:
+def vertex_positions(d: Definition) -> list[int]:
     """Place of each unknown of the model among the unknowns of the DOLFINx cell."""
     out = list(range(len(d.unknowns)))
     for start, components in d.nodal:
@@ -62,7 +62,7 @@ class _CellPrinter(Printer):
 
     def __init__(self, definition: Definition) -> None:
         super().__init__(definition)
-        self.vertices, self.places = vertices(definition), places(definition)
+        self.vertices, self.positions = vertices(definition), vertex_positions(definition)
 
     def ref(self, n: Node) -> str:
         return self.argument(n.payload) if isinstance(n.payload, Input) else super().ref(n)
@@ -74,11 +74,11 @@ class _CellPrinter(Printer):
                 node, component = divmod(k, len(self.d.coordinates))
                 return f"coordinate_dofs[{3 * self.vertices[node] + component}]"
             case "dofs":
-                return f"w[{self.places[k]}]"
+                return f"w[{self.positions[k]}]"
             case "data":
-                return f"w[{len(self.places) + k}]"
+                return f"w[{len(self.positions) + k}]"
             case "point data":
-                start, width = len(self.places) + len(self.d.data), len(self.d.point_data)
+                start, width = len(self.positions) + len(self.d.data), len(self.d.point_data)
                 return f"w[{start} + {width} * q + {k}]"
             case "parameters":
                 return f"c[{k}]"
@@ -100,7 +100,7 @@ def function(
     values = {} if task == abi.Task.FIELDS else {_target(p, task, x): x.node for x in entries}
     p.read(plan, [x.node for x in entries])
     for stage in plan.stages:
-        p.block(1, stage.before)
+        p.block(1, stage.preamble)
         if stage.loop is not None:
             _loop(p, stage.loop, entries if task == abi.Task.FIELDS else [])
     if task == abi.Task.FIELDS:
@@ -118,10 +118,10 @@ def function(
 def _target(p: _CellPrinter, task: str, x: Entry) -> int:
     if task == abi.Task.ENERGY:
         return 0
-    row = p.places[x.row.position]
+    row = p.positions[x.row.position]
     if x.column is None:
         return row
-    return row * len(p.places) + p.places[x.column.position]
+    return row * len(p.positions) + p.positions[x.column.position]
 
 
 def _table(p: Printer) -> None:
@@ -163,7 +163,7 @@ def _same_at_all_points(p: Printer, entries: Sequence[Entry]) -> None:
 
 def _mark(p: _CellPrinter, task: str) -> None:
     """A routine without a result spoils the whole cell."""
-    size = len(p.places)
+    size = len(p.positions)
     sizes = {
         abi.Task.ENERGY: 1,
         abi.Task.TANGENT: size**2,
@@ -174,14 +174,14 @@ def _mark(p: _CellPrinter, task: str) -> None:
     p.line(2, f"for (int k = 0; k < {count}; ++k) A[k] = NAN;")
 
 
-def source(definition: Definition, functions: Iterable[str], before: Iterable[str] = ()) -> str:
-    """The C file of a kernel family; `before` are the routines that its functions call."""
+def source(definition: Definition, functions: Iterable[str], preamble: Iterable[str] = ()) -> str:
+    """The C file of a kernel family; `preamble` are the routines that its functions call."""
     head = [_banner(definition), "#include <math.h>", "#include <stdint.h>", ROOTS]
-    return "\n".join([*head, *before, *functions])
+    return "\n".join([*head, *preamble, *functions])
 
 
 def _banner(d: Definition) -> str:
-    at = dict(zip(places(d), d.unknowns, strict=True))
+    at = dict(zip(vertex_positions(d), d.unknowns, strict=True))
     rows = [f"w[{k}]  {at[k]}" for k in sorted(at)]
     rows += [f"w[{len(at) + k}]  {a.name}: {a.meaning}" for k, a in enumerate(d.data)]
     first, width = len(at) + len(d.data), len(d.point_data)

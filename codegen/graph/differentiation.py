@@ -29,28 +29,28 @@ class Dependence:
 
     sources: Collection[Node]
     constant: Collection[Node] = ()
-    given: Given = field(default_factory=dict)
-    _known: dict[Node, bool] = field(default_factory=dict)
+    prescribed: Given = field(default_factory=dict)
+    _memo: dict[Node, bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.sources, self.constant = frozenset(self.sources), frozenset(self.constant)
 
     def __call__(self, n: Node) -> bool:
-        known = self._known
-        stack = [] if n in known else [n]
+        memo = self._memo
+        stack = [] if n in memo else [n]
         while stack:
             m = stack[-1]
-            if m in known:
+            if m in memo:
                 stack.pop()
             elif m in self.sources or m in self.constant:
-                known[m] = m in self.sources
+                memo[m] = m in self.sources
             else:
-                operands = self.given.get(m, m.args)
-                unknown = [a for a in operands if a not in known]
+                operands = self.prescribed.get(m, m.args)
+                unknown = [a for a in operands if a not in memo]
                 stack += unknown
                 if not unknown:
-                    known[m] = any(known[a] for a in operands)
-        return known[n]
+                    memo[m] = any(memo[a] for a in operands)
+        return memo[n]
 
 
 def gradient(
@@ -59,7 +59,7 @@ def gradient(
     wrt: Sequence[Node],
     *,
     constant: Collection[Node] = (),
-    given: Given | None = None,
+    prescribed: Given | None = None,
     named: Collection[Node] = (),
     flat: bool = False,
 ) -> dict[Node, Node]:
@@ -72,7 +72,7 @@ def gradient(
     to be contracted with the node's own dependence and summed by the caller.  With `flat` it is
     that of a value at a point for the other nodes too, instead of its sum over the points.
     """
-    depends = Dependence(tuple(wrt), constant, given or {})
+    depends = Dependence(tuple(wrt), constant, prescribed or {})
     sweep = _Reverse(g, depends, flat, named=frozenset(named))
     adjoint = sweep.run(root)
     return {**dict.fromkeys(wrt, g.zero), **adjoint}
@@ -106,13 +106,13 @@ class _Reverse:
 
     def _hidden(self) -> list[Node]:
         """Nodes that only a given derivative refers to."""
-        return [k for pairs in self.depends.given.values() for k in pairs]
+        return [k for pairs in self.depends.prescribed.values() for k in pairs]
 
     def _propagate(self, n: Node, seed: Node) -> None:
         if n.op is Op.SUM:
             self._accumulate(self.adjoint, n.args[0], seed)
             return
-        if square_of(n) is not None and n not in self.depends.given:
+        if square_of(n) is not None and n not in self.depends.prescribed:
             self._accumulate(self.adjoint, n.args[0].args[1], self._by_square(n, seed))
             return
         for a, p in self._local(n):
@@ -127,8 +127,8 @@ class _Reverse:
         return shielded(self.g, seed, p, self._certain)
 
     def _local(self, n: Node) -> Partials:
-        if n in self.depends.given:
-            return list(self.depends.given[n].items())
+        if n in self.depends.prescribed:
+            return list(self.depends.prescribed[n].items())
         if n.op is Op.BRANCH:
             return self._branch(n)
         return partials(self.g, n)
@@ -141,13 +141,13 @@ class _Reverse:
         if seed.op is Op.BRANCH and g.zero in seed.args[1:] and seed.args[0] is not n.args[0]:
             c, *sides = seed.args
             return g.branch(c, *(s if s is g.zero else self._by_square(n, s) for s in sides))
-        (curvature,) = directional(g, [seed], {n: g.one}, self.depends.given)
+        (curvature,) = directional(g, [seed], {n: g.one}, self.depends.prescribed)
         if curvature is g.zero:  # a kink
             return self._times(n, seed, slope(g, n))
         inverse = g.mul(g.const(Fraction(1, 2)), g.recip(n.args[1]))
         weighted = self._times(n, seed, inverse)
-        known, kept = exists(g, curvature), self.depends.given
-        return by_square(g, n, (seed, curvature), weighted, exists=known, kept=kept)
+        certain, fixed = exists(g, curvature), self.depends.prescribed
+        return by_square(g, n, (seed, curvature), weighted, exists=certain, fixed=fixed)
 
     def _branch(self, n: Node) -> Partials:
         """Both sides differentiated with respect to the nearest named values and inputs."""
@@ -174,12 +174,12 @@ class _Reverse:
 
 
 def directional(
-    g: Graph, roots: Sequence[Node], seeds: Mapping[Node, Node], given: Given | None = None
+    g: Graph, roots: Sequence[Node], seeds: Mapping[Node, Node], prescribed: Given | None = None
 ) -> list[Node]:
     """Derivatives of `roots` when each key of `seeds` moves at the rate of its value (forward)."""
-    depends = Dependence(tuple(seeds), (), given or {})
+    depends = Dependence(tuple(seeds), (), prescribed or {})
     rate: dict[Node, Node] = {}
-    for n in reachable([*roots, *(k for pairs in depends.given.values() for k in pairs)]):
+    for n in reachable([*roots, *(k for pairs in depends.prescribed.values() for k in pairs)]):
         if n in seeds:
             rate[n] = seeds[n]
         elif not depends(n):
@@ -190,7 +190,9 @@ def directional(
             rate[n] = g.branch(n.args[0], rate[n.args[1]], rate[n.args[2]])
         else:
             rate[n] = g.zero
-            pairs = list(depends.given[n].items()) if n in depends.given else partials(g, n)
+            pairs = (
+                list(depends.prescribed[n].items()) if n in depends.prescribed else partials(g, n)
+            )
             for a, p in pairs:
                 term = guarded(g, p, rate[a])
                 if n.op is Op.POWER and a is n.args[1] and rate[a].op is not Op.CONST:

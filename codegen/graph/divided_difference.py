@@ -72,7 +72,7 @@ class Divided:
         return self.rates[root]
 
     def _rate(self, n: Node) -> Node:
-        g, (a, *rest) = self.g, n.args
+        g, (a, *operands) = self.g, n.args
         du = self.rates[a]
         match n.op:
             case Op.NAME:
@@ -80,11 +80,11 @@ class Divided:
             case Op.NEG:
                 return g.neg(du)
             case Op.ADD:
-                return plus(g, du, self.rates[rest[0]])
+                return plus(g, du, self.rates[operands[0]])
             case Op.SUB:
-                return plus(g, du, g.neg(self.rates[rest[0]]))
+                return plus(g, du, g.neg(self.rates[operands[0]]))
             case Op.MUL:
-                return self._product(a, rest[0])
+                return self._product(a, operands[0])
             case Op.BRANCH:
                 return self._branch(n)
             case Op.ITEM:
@@ -104,20 +104,20 @@ class Divided:
 
     def _slope(self, n: Node, a: Node) -> Node:
         """(f(u) - f(v)) / (u - v) of a function of one argument."""
-        g, at, there = self.g, n, self.other[n]
+        g, at, other = self.g, n, self.other[n]
         match n.op:
             case Op.RECIP:
-                return g.neg(g.mul(at, there))
+                return g.neg(g.mul(at, other))
             case Op.SQRT:
-                return g.recip(g.add(at, there))
+                return g.recip(g.add(at, other))
             case Op.CBRT:
-                return g.recip(self._squares(at, there))
+                return g.recip(self._squares(at, other))
             case Op.RCBRT:
-                cube = g.power(g.mul(at, there), 3)
-                return g.neg(g.div(cube, self._squares(at, there)))
+                cube = g.power(g.mul(at, other), 3)
+                return g.neg(g.div(cube, self._squares(at, other)))
             case Op.POW:
                 return self._fixed_power(n, a)
-        operands = (a, self.other[a], at, there)
+        operands = (a, self.other[a], at, other)
         return g.run(QUOTIENTS[n.op], operands)[0]
 
     def _squares(self, a: Node, b: Node) -> Node:
@@ -162,10 +162,10 @@ class Divided:
         then, otherwise = self.rates[a], self.rates[b]
         if self.other[c] is c or self.equal is None:
             return g.branch(c, then, otherwise)
-        apart = g.div(g.sub(n, self.other[n]), self.gap)
-        first, second = (g.branch(self.equal, side, apart) for side in (then, otherwise))
-        there = self.other[c]
-        return g.branch(c, g.branch(there, then, first), g.branch(there, second, otherwise))
+        quotient = g.div(g.sub(n, self.other[n]), self.gap)
+        first, second = (g.branch(self.equal, side, quotient) for side in (then, otherwise))
+        other = self.other[c]
+        return g.branch(c, g.branch(other, then, first), g.branch(other, second, otherwise))
 
     def _result(self, n: Node) -> Node:
         call, routine = n.args[0], n.args[0].payload
@@ -175,7 +175,7 @@ class Divided:
             self.calls[call] = routine.divided(self, call)
         return self.calls[call][n.payload.index]
 
-    def slopes(
+    def derivatives(
         self, values: Sequence[Node], other: Mapping[Node, Node]
     ) -> tuple[list[list[Node]], Node | None]:
         """Divided differences of values by each key of `other` alone.
@@ -223,8 +223,8 @@ def exchanged(g: Graph, values: Sequence[Node], a: Node, b: Node) -> Divided:
 def _unchanged(roots: Sequence[Node], swap: Mapping[Node, Node]) -> frozenset[Node]:
     """Values that an exchange of inputs leaves as they are, sums and products in any order."""
     numbers: dict[Any, int] = {}
-    here, there = _Content(numbers, {}), _Content(numbers, swap)
-    return frozenset(n for n in reachable(roots) if here(n) == there(n))
+    current, swapped = _Content(numbers, {}), _Content(numbers, swap)
+    return frozenset(n for n in reachable(roots) if current(n) == swapped(n))
 
 
 class _Content:
@@ -232,15 +232,15 @@ class _Content:
 
     def __init__(self, numbers: dict[Any, int], swap: Mapping[Node, Node]) -> None:
         self.numbers, self.swap = numbers, swap
-        self.known: dict[Node, int] = {}
+        self.numbered: dict[Node, int] = {}
         self.parts: dict[Node, Counter[int]] = {}
 
     def __call__(self, n: Node) -> int:
         """The number; those of the operands are known."""
         if n.op is Op.NAME:
-            self.known[n] = self.known[n.args[0]]
+            self.numbered[n] = self.numbered[n.args[0]]
             self.parts[n] = self.parts[n.args[0]]
-            return self.known[n]
+            return self.numbered[n]
         if n.op in (Op.ADD, Op.SUB, Op.NEG):
             kind, parts = "sum", self._sum(n)
         elif n.op is Op.MUL:
@@ -250,12 +250,12 @@ class _Content:
         if kind:
             content: Any = (kind, tuple(sorted((k, c) for k, c in parts.items() if c)))
         elif n.args:
-            content = (n.op, n.payload, tuple(self.known[a] for a in n.args))
+            content = (n.op, n.payload, tuple(self.numbered[a] for a in n.args))
         else:
             content = self.swap.get(n, n)
-        self.known[n] = self.numbers.setdefault(content, len(self.numbers))
+        self.numbered[n] = self.numbers.setdefault(content, len(self.numbers))
         self.parts[n] = parts
-        return self.known[n]
+        return self.numbered[n]
 
     def _sum(self, n: Node) -> Counter[int]:
         total: Counter[int] = Counter()
@@ -270,4 +270,4 @@ class _Content:
         while inner.op is Op.NAME:
             inner = inner.args[0]
         joined = (Op.MUL,) if op is Op.MUL else (Op.ADD, Op.SUB, Op.NEG)
-        return self.parts[inner] if inner.op in joined else Counter({self.known[n]: 1})
+        return self.parts[inner] if inner.op in joined else Counter({self.numbered[n]: 1})

@@ -43,9 +43,9 @@ def results(r: Routine, args: Vector, evaluate: Evaluate) -> Vector:
 
 def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
     p, s = args[: r.inputs - r.outputs], args[r.inputs - r.outputs :]
-    before, A = mpmath.inf, None
+    previous, A = mpmath.inf, None
     for _ in range(200):
-        A = A or _slopes(r, s, p, evaluate)
+        A = A or _jacobian(r, s, p, evaluate)
         try:
             step = mpmath.lu_solve(A, mpmath.matrix(evaluate(r.equations, s, p)))
         except ZeroDivisionError:
@@ -53,11 +53,11 @@ def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
         s = [v - step[i] for i, v in enumerate(s)]
         digits = mpmath.mpf(10) ** (8 - mpmath.mp.dps)
         changes = [abs(v) for v in step]
-        near = all(c <= digits * abs(v) for c, v in zip(changes, s, strict=True))
-        if near or digits * max(1, *map(abs, s)) >= max(changes) > before / 2:
+        converged = all(c <= digits * abs(v) for c, v in zip(changes, s, strict=True))
+        if converged or digits * max(1, *map(abs, s)) >= max(changes) > previous / 2:
             return s  # to its own digits, or to those that rounding leaves
-        before = max(changes)
-        if before > _CLOSE * max(map(abs, s)):  # else these slopes give eight digits a step
+        previous = max(changes)
+        if previous > _CLOSE * max(map(abs, s)):  # else these slopes give eight digits a step
             A = None
     return [mpmath.nan] * len(s)
 
@@ -65,7 +65,7 @@ def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
 _CLOSE = 1e-8
 
 
-def _slopes(r: Newton, s: Vector, p: Vector, evaluate: Evaluate) -> mpmath.matrix:
+def _jacobian(r: Newton, s: Vector, p: Vector, evaluate: Evaluate) -> mpmath.matrix:
     """dg/ds by differences."""
     h = mpmath.mpf(10) ** (-mpmath.mp.dps // 3)
     A = mpmath.matrix(len(s), len(s))
@@ -121,11 +121,13 @@ def symmetric(value: Node, unknowns: Sequence[Node]) -> bool:
             at = {n: mpmath.mpf(2) ** rng.uniform(-width, width) for n in inputs}
             turns = [list(reversed(point))]
             turns += [[*point[k:], *point[:k]] for k in range(len(unknowns))]
-            found = [_value_at(value, {**at, **dict(zip(unknowns, t, strict=True))}) for t in turns]
-            if any(v is None for v in found):
-                if any(v is not None for v in found):
+            values = [
+                _value_at(value, {**at, **dict(zip(unknowns, t, strict=True))}) for t in turns
+            ]
+            if any(v is None for v in values):
+                if any(v is not None for v in values):
                     return False
-            elif any(abs(v - found[0]) > 1e-20 * (1 + abs(found[0])) for v in found):
+            elif any(abs(v - values[0]) > 1e-20 * (1 + abs(values[0])) for v in values):
                 return False
     return True
 
@@ -166,16 +168,16 @@ def _localised(values: Sequence[Node], local: Vector, external: Vector) -> Vecto
     """Values of a routine from its arguments."""
     at: dict[Node, Any] = {}
     arrays = {"local": local, "external": external}
-    found = []
+    nodes = []
     for n in reachable(values):
         if n.op is Op.INPUT:
             assert isinstance(n.payload, Input)
             at[n] = arrays[n.payload.array][n.payload.index]
     for value in values:
-        found.append(_value_at(value, at))
-        if found[-1] is None:
+        nodes.append(_value_at(value, at))
+        if nodes[-1] is None:
             raise ValueError("a local equation has no real value")
-    return found
+    return nodes
 
 
 _UNARY: dict[Op, Callable[[Number], Number]] = {
@@ -251,7 +253,7 @@ class Walk:
             "data": exact(state.data),
             "parameters": exact(state.parameters),
         }
-        self.known: dict[tuple[Node, int], Number] = {}
+        self.memo: dict[tuple[Node, int], Number] = {}
 
     def value(self, n: Node) -> Number:
         """Value of a node that does not vary with the point."""
@@ -266,9 +268,9 @@ class Walk:
         key = (n, q)
         if key in self.frozen:
             return self.frozen[key]
-        if key not in self.known:
-            self.known[key] = yield self._compute(n, q)
-        return self.known[key]
+        if key not in self.memo:
+            self.memo[key] = yield self._compute(n, q)
+        return self.memo[key]
 
     def _compute(self, n: Node, q: int) -> Recursion[Number]:
         match n.op:
@@ -285,8 +287,8 @@ class Walk:
                     terms.append((yield self._at(n.args[0], k)))
                 return mpmath.fsum(terms)
             case Op.BRANCH:
-                taken = yield self._at(n.args[0], q)
-                return (yield self._at(n.args[1 if taken else 2], q))
+                condition = yield self._at(n.args[0], q)
+                return (yield self._at(n.args[1 if condition else 2], q))
             case Op.CALL:
                 assert isinstance(n.payload, Routine)
                 operands = []

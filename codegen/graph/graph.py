@@ -166,13 +166,13 @@ class Graph:
     def node(self, op: Op, args: tuple[Node, ...] = (), payload: Payload = None) -> Node:
         """Intern a node without any rewriting."""
         key = (op, tuple(a.id for a in args), payload)
-        found = self._table.get(key)
-        if found is None:
+        existing = self._table.get(key)
+        if existing is None:
             varying = (isinstance(payload, Input) and payload.varying) or (
                 op is not Op.SUM and any(a.varying for a in args)
             )
-            found = self._table[key] = Node(len(self._table), op, args, payload, varying)
-        return found
+            existing = self._table[key] = Node(len(self._table), op, args, payload, varying)
+        return existing
 
     # leaves -------------------------------------------------------------------------------------
 

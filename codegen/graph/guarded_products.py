@@ -34,7 +34,7 @@ def guarded(g: Graph, a: Node, b: Node) -> Node:
 
 def exists(g: Graph, n: Node) -> bool:
     """True if a value is a number for all finite arguments (overflow apart)."""
-    return _known_of(g).domain.exists(n)
+    return _facts_of(g).domain.exists(n)
 
 
 class Certain:
@@ -60,11 +60,11 @@ def shielded(g: Graph, seed: Node, partial: Node, certain: Certain) -> Node:
     The zeros of sides may stand anywhere in the adjoint: in terms of different branches, in
     branches of branches, in sums over points.
     """
-    known = _known_of(g)
+    facts = _facts_of(g)
     direct = seed.op is Op.BRANCH and g.zero in seed.args[1:]
-    if direct or not recursion(known.vanishes(seed)) or known.exists(partial, certain):
+    if direct or not recursion(facts.vanishes(seed)) or facts.exists(partial, certain):
         return guarded(g, seed, partial)
-    return recursion(_product(g, known, seed, partial))
+    return recursion(_product(g, facts, seed, partial))
 
 
 def plus(g: Graph, a: Node, b: Node) -> Node:
@@ -78,36 +78,36 @@ def plus(g: Graph, a: Node, b: Node) -> Node:
     return g.add(a, b)
 
 
-def _product(g: Graph, known: _Known, x: Node, y: Node) -> Recursion[Node]:
+def _product(g: Graph, facts: _Facts, x: Node, y: Node) -> Recursion[Node]:
     """x y, where y is evaluated only where a branch takes x."""
-    if not (yield known.vanishes(x)):
+    if not (yield facts.vanishes(x)):
         return g.mul(x, y)
     match x.op:
         case Op.NEG:
-            return g.neg((yield _product(g, known, x.args[0], y)))
+            return g.neg((yield _product(g, facts, x.args[0], y)))
         case Op.BRANCH:
             c, then, otherwise = x.args
-            inside = yield _product(g, known, then, y)
-            return g.branch(c, inside, (yield _product(g, known, otherwise, y)))
+            inside = yield _product(g, facts, then, y)
+            return g.branch(c, inside, (yield _product(g, facts, otherwise, y)))
         case Op.SUM if not y.varying:
-            return g.sum((yield _product(g, known, x.args[0], y)))
-        case Op.ADD | Op.SUB if (yield known.summed(x)):
+            return g.sum((yield _product(g, facts, x.args[0], y)))
+        case Op.ADD | Op.SUB if (yield facts.summed(x)):
             sides = []
             for a in x.args:
-                sides.append((yield _product(g, known, a, y)))
+                sides.append((yield _product(g, facts, a, y)))
             return g.add(*sides) if x.op is Op.ADD else g.sub(*sides)
-    taken = yield known.taken(g, x)
-    return g.mul(x, y) if taken is None else g.branch(taken, g.mul(x, y), g.zero)
+    active = yield facts.active(g, x)
+    return g.mul(x, y) if active is None else g.branch(active, g.mul(x, y), g.zero)
 
 
-class _Known:
+class _Facts:
     """Uses of the values of one graph, remembered once they are known."""
 
     def __init__(self, g: Graph) -> None:
         self.domain = Domain(g)
         self._vanishing: dict[Node, bool] = {g.zero: True}
         self._summed: dict[Node, bool] = {}
-        self._taken: dict[Node, Node | None] = {g.zero: None}
+        self._active: dict[Node, Node | None] = {g.zero: None}
 
     def exists(self, n: Node, certain: Certain) -> bool:
         """True if a value is a number wherever those that are certain are."""
@@ -119,11 +119,13 @@ class _Known:
     def vanishes(self, n: Node) -> Recursion[bool]:
         """True if a value is an exact zero on some sides of branches."""
         if n not in self._vanishing:
-            found = []
+            conditions = []
             for a in _parts(n):
-                found.append((yield self.vanishes(a)))
+                conditions.append((yield self.vanishes(a)))
             every = n.op in (Op.ADD, Op.SUB)
-            self._vanishing[n] = bool(found) and (all(found) if every else any(found))
+            self._vanishing[n] = bool(conditions) and (
+                all(conditions) if every else any(conditions)
+            )
         return self._vanishing[n]
 
     def summed(self, n: Node) -> Recursion[bool]:
@@ -134,16 +136,16 @@ class _Known:
                 self._summed[n] = (yield self.summed(a)) or self._summed[n]
         return self._summed[n]
 
-    def taken(self, g: Graph, n: Node) -> Recursion[Node | None]:
+    def active(self, g: Graph, n: Node) -> Recursion[Node | None]:
         """Condition under which branches take a value, None: always."""
-        if n not in self._taken:
-            self._taken[n] = None
+        if n not in self._active:
+            self._active[n] = None
             if (yield self.vanishes(n)) and n.op is not Op.SUM:
                 sides = []
                 for a in _parts(n):
-                    sides.append((yield self.taken(g, a)))
-                self._taken[n] = _combined(g, n, sides)
-        return self._taken[n]
+                    sides.append((yield self.active(g, a)))
+                self._active[n] = _combined(g, n, sides)
+        return self._active[n]
 
 
 def _parts(n: Node) -> tuple[Node, ...]:
@@ -159,8 +161,8 @@ def _combined(g: Graph, n: Node, sides: list[Node | None]) -> Node | None:
         c = n.args[0]
         if g.zero in n.args[1:]:
             k = n.args.index(g.zero, 1)
-            own = c if k == 2 else g.node(Op.NOT, (c,))
-            return _joined(g, Op.AND, own, sides[2 - k])
+            side = c if k == 2 else g.node(Op.NOT, (c,))
+            return _joined(g, Op.AND, side, sides[2 - k])
         then = _joined(g, Op.AND, c, sides[0])
         otherwise = _joined(g, Op.AND, g.node(Op.NOT, (c,)), sides[1])
         return None if sides == [None, None] else g.node(Op.OR, (then, otherwise))
@@ -176,8 +178,8 @@ def _joined(g: Graph, op: Op, a: Node, b: Node | None) -> Node:
     return a if b is None or a is b else g.node(op, (a, b))
 
 
-def _known_of(g: Graph) -> _Known:
-    return _KNOWN.get(g) or _KNOWN.setdefault(g, _Known(g))
+def _facts_of(g: Graph) -> _Facts:
+    return _KNOWN.get(g) or _KNOWN.setdefault(g, _Facts(g))
 
 
-_KNOWN: WeakKeyDictionary[Graph, _Known] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Graph, _Facts] = WeakKeyDictionary()

@@ -52,12 +52,12 @@ def by_square(
     weighted: Node,
     *,
     exists: bool,
-    kept: Collection[Node] = (),
+    fixed: Collection[Node] = (),
 ) -> Node:
     """Derivative of f(n) by the square of the length n.
 
     derivatives: f' and f''. weighted: f' / (2 n), a number where n > 0 only. exists: whether
-    f'' is one for all finite arguments. kept: values in f' that do not change with the length.
+    f'' is one for all finite arguments. fixed: values in f' that do not change with the length.
     """
     square, half = n.args[0].args[1], g.const(Fraction(1, 2))
     kinked = g.branch(n.args[0], weighted, g.zero)
@@ -65,13 +65,13 @@ def by_square(
         smooth = _is_smooth(g, *derivatives, square, _ROUNDED)
         limit = g.branch(smooth, g.mul(half, derivatives[1]), kinked)
     else:
-        limit = _limit(g, n, derivatives, kinked, weighted, kept)
+        limit = _limit(g, n, derivatives, kinked, weighted, fixed)
     return g.branch(g.compare(Op.LT, square, g.const(_SMALL)), limit, weighted)
 
 
-def _is_smooth(g: Graph, slope: Node, curvature: Node, square: Node, least: Fraction) -> Node:
+def _is_smooth(g: Graph, slope: Node, curvature: Node, square: Node, is_zero: Fraction) -> Node:
     """True if f' = f'' n up to higher powers of n: f = n^p with 1 < p < 2 has no f''(0)."""
-    bound = g.mul(g.const(least), g.mul(g.mul(curvature, curvature), square))
+    bound = g.mul(g.const(is_zero), g.mul(g.mul(curvature, curvature), square))
     return g.compare(Op.LE, g.mul(slope, slope), bound)
 
 
@@ -81,21 +81,21 @@ def _limit(
     derivatives: Sequence[Node],
     kinked: Node,
     weighted: Node,
-    kept: Collection[Node],
+    fixed: Collection[Node],
 ) -> Node:
     """f''(0) / 2 where f'' may be of the form inf * 0 at zero: then that near zero."""
     square, half = n.args[0].args[1], g.const(Fraction(1, 2))
-    least = g.compare(Op.LE, square, g.const(_SMALL))
+    is_zero = g.compare(Op.LE, square, g.const(_SMALL))
 
     def at(size: Fraction | int) -> list[Node]:
         # a branch: a constant zero would be folded, and inf * 0 with it
-        return _moved(g, derivatives, n, g.branch(least, g.const(size), n), kept)
+        return _moved(g, derivatives, n, g.branch(is_zero, g.const(size), n), fixed)
 
     first, second = at(0)
     smooth = g.node(Op.AND, (g.compare(Op.EQ, first, g.zero), _is_finite(g, second)))
-    near, bent = at(_NEAR)
-    nearly = _is_smooth(g, near, bent, g.const(_NEAR**2), _NEARLY)
-    number = g.node(Op.AND, (_is_finite(g, near), _is_finite(g, bent)))
+    slope_near, bent = at(_NEAR)
+    nearly = _is_smooth(g, slope_near, bent, g.const(_NEAR**2), _NEARLY)
+    number = g.node(Op.AND, (_is_finite(g, slope_near), _is_finite(g, bent)))
     edge = g.branch(number, kinked, weighted)  # without a number there is none at all
     return g.branch(smooth, g.mul(half, second), g.branch(nearly, g.mul(half, bent), edge))
 
@@ -107,14 +107,14 @@ def _is_finite(g: Graph, a: Node) -> Node:
 
 
 def _moved(
-    g: Graph, roots: Sequence[Node], n: Node, other: Node, kept: Collection[Node]
+    g: Graph, roots: Sequence[Node], n: Node, other: Node, fixed: Collection[Node]
 ) -> list[Node]:
     """Values in which another value stands for a length, without the names that it changes."""
     new = {n: other}
-    for m in reachable(roots, stop=lambda m: m is n or m in kept):
+    for m in reachable(roots, stop=lambda m: m is n or m in fixed):
         if m in new:
             continue
-        args = m.args if m in kept else tuple(new[a] for a in m.args)
+        args = m.args if m in fixed else tuple(new[a] for a in m.args)
         if args == m.args:
             new[m] = m
         else:

@@ -40,11 +40,11 @@ def close_rational(number: Any) -> Fraction:
         return Fraction(int(number.p), int(number.q))
     if number.is_negative:
         return -close_rational(-number)
-    near = int(sp.floor(number.evalf(120) * DENOMINATOR))
+    numerator = int(sp.floor(number.evalf(120) * DENOMINATOR))
     exact = _image(number)
     if exact is not None:
-        near += (exact * DENOMINATOR - near) % PRIME
-    return Fraction(near, DENOMINATOR)
+        numerator += (exact * DENOMINATOR - numerator) % PRIME
+    return Fraction(numerator, DENOMINATOR)
 
 
 def _image(e: Any) -> int | None:

@@ -50,10 +50,10 @@ def localise(g: Graph, values: Sequence[Node], unknowns: Sequence[Node]) -> Loca
             stack.extend(n.args)
         else:
             external.append(n)
-    found = sorted(external, key=lambda n: n.id)
+    inputs = sorted(external, key=lambda n: n.id)
     replacement = {u: g.input("local", k) for k, u in enumerate(unknowns)}
-    replacement |= {n: g.input("external", k) for k, n in enumerate(found)}
-    return LocalisedValues(tuple(substitute(g, values, replacement)[0]), tuple(found))
+    replacement |= {n: g.input("external", k) for k, n in enumerate(inputs)}
+    return LocalisedValues(tuple(substitute(g, values, replacement)[0]), tuple(inputs))
 
 
 def depends(values: Sequence[Node], sources: Iterable[Node]) -> set[Node]:
@@ -94,7 +94,7 @@ def items(g: Graph, call: Node) -> list[Node]:
     return [g.node(Op.ITEM, (call,), ResultIndex(k)) for k in range(routine.outputs)]
 
 
-def place(item: Node) -> int:
+def result_index(item: Node) -> int:
     """Position of a result."""
     assert isinstance(item.payload, ResultIndex)
     return item.payload.index
@@ -129,13 +129,13 @@ class Newton(Routine):
     by_local: tuple[tuple[Node, ...], ...]
     by_external: tuple[tuple[Node, ...], ...]
     control: Control
-    _slopes: dict[Node, Matrix] = field(default_factory=dict)
+    _jacobian: dict[Node, Matrix] = field(default_factory=dict)
 
     def partials(self, g: Graph, item: Node) -> Pairs:
         call = item.args[0]
-        if call not in self._slopes:
-            self._slopes[call] = self._slope(g, call)
-        row = self._slopes[call][place(item)]
+        if call not in self._jacobian:
+            self._jacobian[call] = self._slope(g, call)
+        row = self._jacobian[call][result_index(item)]
         return list(zip(call.args, row, strict=False))
 
     def _slope(self, g: Graph, call: Node) -> Matrix:
@@ -148,17 +148,17 @@ class Newton(Routine):
 
     def divided(self, between: Divided, call: Node) -> list[Node]:
         """Divided differences of the results: the equations have none."""
-        g, there = between.g, between.other[call]
+        g, other_call = between.g, between.other[call]
         s, p = items(g, call), call.args[: self.inputs - self.outputs]
-        other = dict(zip([*s, *p], [*items(g, there), *there.args], strict=False))
-        rows, same = between.slopes(lifted(g, self.equations, s, p), other)
+        other = dict(zip([*s, *p], [*items(g, other_call), *other_call.args], strict=False))
+        rows, same = between.derivatives(lifted(g, self.equations, s, p), other)
         X = inverse(g, [row[: len(s)] for row in rows])
         moved = [_contracted(g, row[len(s) :], [between.rates[a] for a in p]) for row in rows]
-        found = [g.neg(_contracted(g, row, moved)) for row in X]
+        differences = [g.neg(_contracted(g, row, moved)) for row in X]
         if same is None:
-            return found
-        apart = [g.div(g.sub(a, other[a]), between.gap) for a in s]
-        return [g.branch(same, a, b) for a, b in zip(found, apart, strict=True)]
+            return differences
+        quotients = [g.div(g.sub(a, other[a]), between.gap) for a in s]
+        return [g.branch(same, a, b) for a, b in zip(differences, quotients, strict=True)]
 
 
 def _contracted(g: Graph, a: Sequence[Node], b: Sequence[Node]) -> Node:
@@ -178,14 +178,14 @@ def newton(g: Graph, name: str, local: LocalisedValues, control: Control) -> New
     count = len(local.values)
     s = [g.input("local", k) for k in range(count)]
     p = [g.input("external", k) for k in range(len(local.external))]
-    slopes = [gradient(g, value, [*s, *p]) for value in local.values]
+    gradients = [gradient(g, value, [*s, *p]) for value in local.values]
     return Newton(
         name,
         len(p) + count,
         count,
         local.values,
-        tuple(tuple(row[n] for n in s) for row in slopes),
-        tuple(tuple(row[n] for n in p) for row in slopes),
+        tuple(tuple(row[n] for n in s) for row in gradients),
+        tuple(tuple(row[n] for n in p) for row in gradients),
         control,
     )
 
@@ -200,7 +200,7 @@ class Inverse(Routine):
     size: int
 
     def partials(self, g: Graph, item: Node) -> Pairs:
-        X, (i, j) = items(g, item.args[0]), divmod(place(item), self.size)
+        X, (i, j) = items(g, item.args[0]), divmod(result_index(item), self.size)
         out = []
         for position, a in enumerate(item.args[0].args):
             k, l = divmod(position, self.size)  # noqa: E741
@@ -277,7 +277,7 @@ class Isotropic(Routine):
     def partials(self, g: Graph, item: Node) -> Pairs:
         if self.order == 2:
             raise DifferentiationError(f"{self.name}: no third derivatives by the stretches")
-        args, k = item.args[0].args, place(item)
+        args, k = item.args[0].args, result_index(item)
         raised = g.run(self._relative(self.energy, self.order + 1, self.name), args)
         by_C = raised if self.order == 0 else [raised[upper(k, i)] for i in range(6)]
         pairs = list(zip(args, by_C, strict=False))

@@ -37,55 +37,58 @@ class Domain:
         self._exist: dict[tuple[Node, Known], bool] = {}
         self._fixed: dict[Node, bool] = {}
 
-    def positive(self, n: Node, known: Known = frozenset()) -> bool:
+    def positive(self, n: Node, assumed: Known = frozenset()) -> bool:
         """True if a value, where it exists, is > 0."""
-        return self._sign(n, known) == 2
+        return self._sign(n, assumed) == 2
 
-    def nonnegative(self, n: Node, known: Known = frozenset()) -> bool:
+    def nonnegative(self, n: Node, assumed: Known = frozenset()) -> bool:
         """True if a value, where it exists, is >= 0."""
-        return self._sign(n, known) >= 1
+        return self._sign(n, assumed) >= 1
 
-    def exists(self, n: Node, known: Known = frozenset(), depth: int = 0) -> bool:
+    def exists(self, n: Node, assumed: Known = frozenset(), depth: int = 0) -> bool:
         """True if a value is a number for all finite arguments (overflow apart)."""
-        key = (n, known)
+        key = (n, assumed)
         if key not in self._exist:
-            self._exist[key] = depth < _DEEP and self._found(n, known, depth + 1)
+            self._exist[key] = depth < _DEEP and self._exists(n, assumed, depth + 1)
         return self._exist[key]
 
-    def _found(self, n: Node, known: Known, depth: int) -> bool:
+    def _exists(self, n: Node, assumed: Known, depth: int) -> bool:
         if n.op in (Op.ITEM, Op.CALL):  # where it has no result the whole element has none
             return True
         if n.op is Op.BRANCH:
-            sides = ((1, known | self._says(n.args[0], True)), (2, known | self._says(n.args[0])))
+            sides = (
+                (1, assumed | self._says(n.args[0], True)),
+                (2, assumed | self._says(n.args[0])),
+            )
             return all(self.exists(n.args[k], side, depth) for k, side in sides)
-        if not all(a.op in BOOLEAN or self.exists(a, known, depth) for a in n.args):
+        if not all(a.op in BOOLEAN or self.exists(a, assumed, depth) for a in n.args):
             return False
-        return n.op in EVERYWHERE or not n.args or self._allowed(n, known)
+        return n.op in EVERYWHERE or not n.args or self._allowed(n, assumed)
 
-    def _allowed(self, n: Node, known: Known) -> bool:
+    def _allowed(self, n: Node, assumed: Known) -> bool:
         """True if the argument of a function lies in its domain."""
         a = n.args[0]
         match n.op:
             case Op.SQRT:
-                return self.nonnegative(a, known)
+                return self.nonnegative(a, assumed)
             case Op.CBRT:
                 return True
             case Op.RECIP:
-                return self.positive(a, known) or (self._given(a) and a is not self.zero)
+                return self.positive(a, assumed) or (self._is_condition(a) and a is not self.zero)
             case Op.LOG | Op.RCBRT | Op.POWER:
-                return self.positive(a, known)
+                return self.positive(a, assumed)
             case Op.POW:
                 e = n.payload
                 assert isinstance(e, Fraction)
                 if e.denominator == 1 and e > 0:
                     return True
-                if e.denominator == 1 and self._given(a):
+                if e.denominator == 1 and self._is_condition(a):
                     return True
                 from_zero = e > 0 and e.denominator != 3  # a^(1/3) is a (a^(-1/3))^2
-                return self.positive(a, known) or (from_zero and self.nonnegative(a, known))
+                return self.positive(a, assumed) or (from_zero and self.nonnegative(a, assumed))
         return False
 
-    def _given(self, n: Node) -> bool:
+    def _is_condition(self, n: Node) -> bool:
         """True if a value comes from parameters, data and constants alone."""
         if n not in self._fixed:
             sources = {m.payload.array for m in reachable([n]) if isinstance(m.payload, Input)}
@@ -102,7 +105,7 @@ class Domain:
 
     def _cores(self, a: Node) -> list[Node]:
         """Values in `a` one of which is not-a-number where `a` is."""
-        found, stack, seen = [], [a], set[Node]()
+        cores, stack, seen = [], [a], set[Node]()
         while stack:
             n = stack.pop()
             if n in seen or self.exists(n):
@@ -113,21 +116,21 @@ class Domain:
             elif self._is_plain(n):
                 stack += n.args
             else:
-                found.append(n)
-        return found
+                cores.append(n)
+        return cores
 
-    def _sign(self, n: Node, known: Known, depth: int = 0) -> int:
+    def _sign(self, n: Node, assumed: Known, depth: int = 0) -> int:
         """2 for positive, 1 for not negative, 0 for no idea."""
-        if n in known:
+        if n in assumed:
             return 2
-        key = (n, known)
+        key = (n, assumed)
         if key not in self._signs:
-            self._signs[key] = self._compute(n, known, depth + 1) if depth < _DEEP else 0
+            self._signs[key] = self._compute(n, assumed, depth + 1) if depth < _DEEP else 0
         return self._signs[key]
 
-    def _compute(self, n: Node, known: Known, depth: int) -> int:
+    def _compute(self, n: Node, assumed: Known, depth: int) -> int:
         def signs() -> list[int]:
-            return [self._sign(a, known, depth) for a in n.args]
+            return [self._sign(a, assumed, depth) for a in n.args]
 
         match n.op:
             case Op.CONST:
@@ -137,8 +140,8 @@ class Domain:
             case Op.NAME | Op.RECIP | Op.SUM | Op.RCBRT | Op.CBRT | Op.SQRT:
                 return signs()[0] or int(n.op is Op.SQRT)
             case Op.ADD:
-                found = signs()
-                return max(found) if min(found) else 0
+                sign = signs()
+                return max(sign) if min(sign) else 0
             case Op.MUL:
                 return max(min(signs()), int(n.args[0] is n.args[1]))
             case Op.POW | Op.POWER:
@@ -150,16 +153,16 @@ class Domain:
                 if self._is_absolute(n):
                     return 1
                 return min(
-                    self._sign(a, known | self._says(c, True), depth),
-                    self._sign(b, known | self._says(c), depth),
+                    self._sign(a, assumed | self._says(c, True), depth),
+                    self._sign(b, assumed | self._says(c), depth),
                 )
         return 0
 
     def _is_plain(self, n: Node) -> bool:
         """True if a value is a number for finite operands."""
-        whole = n.op is Op.POW and n.payload in WHOLE
+        integer_power = n.op is Op.POW and n.payload in WHOLE
         product = n.op is Op.MUL and all(a.op is not Op.RECIP for a in n.args)
-        return n.op in _PLAIN or whole or product
+        return n.op in _PLAIN or integer_power or product
 
     def _is_absolute(self, n: Node) -> bool:
         c, a, b = n.args
@@ -197,18 +200,18 @@ def decidable(
         unsure = [a for a in c.args if not domain.exists(a)]
         if otherwise is not None:
             unsure = [a for a in unsure if not domain.propagates(otherwise, a)]
-        known = [g.compare(Op.EQ, a, a) for a in unsure]
-        if not known:
+        existence = [g.compare(Op.EQ, a, a) for a in unsure]
+        if not existence:
             return None, []
-        both = known[0] if len(known) == 1 else g.node(Op.AND, (known[0], known[1]))
+        both = existence[0] if len(existence) == 1 else g.node(Op.AND, (existence[0], existence[1]))
         return both, [g.sub(*c.args)]
     (one, first), (other, second) = (decidable(g, domain, a) for a in c.args)
     # one of the two decides alone where it is false in `and`, true in `or`
     alone = [a if c.op is Op.OR else g.node(Op.NOT, (a,)) for a in c.args]
     differences = [*first, *second]
     if one is None or other is None:
-        rest, decides = (other, alone[0]) if one is None else (one, alone[1])
-        return None if rest is None else g.node(Op.OR, (rest, decides)), differences
+        remaining, decides = (other, alone[0]) if one is None else (one, alone[1])
+        return None if remaining is None else g.node(Op.OR, (remaining, decides)), differences
     either = [g.node(Op.AND, pair) for pair in ((one, alone[0]), (other, alone[1]))]
     both = g.node(Op.AND, (one, other))
     return g.node(Op.OR, (both, g.node(Op.OR, (either[0], either[1])))), differences

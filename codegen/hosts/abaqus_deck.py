@@ -33,13 +33,13 @@ def deck(page: ElementInterface, mesh: Patch, settings: Sequence[float]) -> str:
         *_element(page, len(settings)),
         "*ELEMENT, TYPE=U1, ELSET=CELLS",
         *_rows((n + 1, *(k + 1 for k in cell)) for n, cell in enumerate(mesh.cells)),
-        *("*UEL PROPERTY, ELSET=CELLS", *named(page.given, settings, page.definition.example)),
+        *("*UEL PROPERTY, ELSET=CELLS", *named(page.inputs, settings, page.definition.example)),
         *_initial(page),
         f"*STEP, NLGEOM=YES{'' if page.symmetric else ', UNSYMM=YES'}",
         *(_procedure(page), f"{dt!r}, {INCREMENTS * dt!r}", "*BOUNDARY"),
         *(
             f"{h.node + 1}, {numbers[h.field]}, {numbers[h.field]}, {h.value!r}"
-            for h in patch_mesh.held(page, mesh)
+            for h in patch_mesh.prescribed(page, mesh)
         ),
         *("*NODE PRINT, NSET=ALL", "U" if page.vector else "NT"),
         *("*EL PRINT, ELSET=CELLS", "SDV", "*END STEP", ""),
@@ -51,7 +51,7 @@ def _element(page: ElementInterface, settings: int) -> list[str]:
     """The definition of the element, with the degrees of freedom at its nodes."""
     d, numbers = page.definition, degrees(page)
     rows = [
-        [numbers[k] for k, f in enumerate(page.nodal) if node < len(f.places)]
+        [numbers[k] for k, f in enumerate(page.nodal) if node < len(f.dofs)]
         for node in range(d.nodes)
     ]
     changes = [
@@ -91,8 +91,8 @@ def _procedure(page: ElementInterface) -> str:
 
 def _initial(page: ElementInterface) -> list[str]:
     """Lines for a state that does not begin with zeros."""
-    given = dict(page.definition.example)
-    state = [given.get(a.name, 0.0) for a in page.state] * page.points
+    example = dict(page.definition.example)
+    state = [example.get(a.name, 0.0) for a in page.state] * page.points
     if not any(state):
         return []
     values = _lines(state, 7)
@@ -104,8 +104,8 @@ def _rows(rows: Iterable[Sequence[float]]) -> list[str]:
     return [line for row in rows for line in _lines(row, 16)]
 
 
-def _lines(values: Sequence[float], most: int) -> list[str]:
-    parts = [values[k : k + most] for k in range(0, len(values), most)]
+def _lines(values: Sequence[float], per_line: int) -> list[str]:
+    parts = [values[k : k + per_line] for k in range(0, len(values), per_line)]
     return [
         ", ".join(map(repr, part)) + ("," if n + 1 < len(parts) else "")
         for n, part in enumerate(parts)

@@ -10,7 +10,13 @@ from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.abaqus_deck import deck, degrees
-from softehl.codegen.hosts.element_interface import Before, ElementInterface, Given, Source, Timed
+from softehl.codegen.hosts.element_interface import (
+    ElementInterface,
+    PreviousValue,
+    Source,
+    TimeStepValue,
+    UserInput,
+)
 from softehl.codegen.hosts.test_states import samples
 
 
@@ -18,17 +24,17 @@ def uel(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     """Every file of a user element."""
     _require(page)
     texts, kernel = c_interface.files(page, single=True)
-    found = samples(page, kernel, host.in_time(page, states))
-    words = _words(page)
-    texts["uel.c"] = c_interface.filled(c_interface.template("uel.c"), words)
+    references = samples(page, kernel, host.in_time(page, states))
+    substitutions = _substitutions(page)
+    texts["uel.c"] = c_interface.filled(c_interface.template("uel.c"), substitutions)
     texts["host.f90"] = host.program(page)
     texts["Makefile"] = c_interface.filled(
-        c_interface.template("abaqus.mk"), {**words, "kind": "uel", "host": "host.f90"}
+        c_interface.template("abaqus.mk"), {**substitutions, "kind": "uel", "host": "host.f90"}
     )
-    texts["NOTES.md"] = c_interface.filled(c_interface.template("uel.md"), words)
-    texts["samples.txt"] = host.sample_file(page, found)
+    texts["NOTES.md"] = c_interface.filled(c_interface.template("uel.md"), substitutions)
+    texts["samples.txt"] = host.sample_file(page, references)
     if page.cell is not None:
-        mesh, settings = patch_mesh.patch(page.cell), host.settings_of(page, found[0])
+        mesh, settings = patch_mesh.patch(page.cell), host.settings_of(page, references[0])
         texts["patch.txt"] = host.patch_file(page, mesh, settings)
         texts[f"{page.name}.inp"] = deck(page, mesh, settings)
     return texts
@@ -49,15 +55,15 @@ def _require(page: ElementInterface) -> None:
         page.require("abaqus", Task.FIELDS)
 
 
-def _words(page: ElementInterface) -> dict[str, object]:
+def _substitutions(page: ElementInterface) -> dict[str, object]:
     d, numbers = page.definition, degrees(page)
-    rows = [f"| {k + 1} | {a.name}: {a.meaning} |" for k, a in enumerate(page.given)]
+    rows = [f"| {k + 1} | {a.name}: {a.meaning} |" for k, a in enumerate(page.inputs)]
     names = [f"`{f.name}` is {n}" for f, n in zip(page.nodal, numbers, strict=True)]
     state = [a.name for a in page.state]
     return {
         "name": page.name,
         "NAME": page.name.upper(),
-        "given": len(page.given),
+        "given": len(page.inputs),
         "order": ", ".join(map(str, page.by_node())),
         "arguments": "".join(arguments(page)),
         "conditions": "".join(conditions(page, "*jelem")),
@@ -87,10 +93,10 @@ def conditions(page: ElementInterface, element: str) -> Iterable[str]:
     """Lines of C that refuse arguments which the page does not allow; element: its number in C."""
     d = page.definition
     rows = (("p", d.parameters), ("data", d.data))
-    places = {a.name: f"{array}[{k}]" for array, row in rows for k, a in enumerate(row)}
+    entries = {a.name: f"{array}[{k}]" for array, row in rows for k, a in enumerate(row)}
     for c in d.conditions:
         yield (
-            f"    if (!({places[c.name]} {c.relation} {number(c.bound)}))\n"
+            f"    if (!({entries[c.name]} {c.relation} {number(c.bound)}))\n"
             f'        refuse({element}, "{c.name} {c.relation} {c.bound:g} is required");\n'
         )
 
@@ -98,11 +104,11 @@ def conditions(page: ElementInterface, element: str) -> Iterable[str]:
 def _argument(page: ElementInterface, source: Source) -> str:
     rate = "(*dtime > 0.0 ? 1.0 / *dtime : 0.0)"
     match source:
-        case Given(index):
+        case UserInput(index):
             return f"props[{index}]"
-        case Timed(what):
+        case TimeStepValue(what):
             return "*dtime" if what == "dt" else rate
-        case Before(place, is_rate):
+        case PreviousValue(place, is_rate):
             i = page.by_node().index(place)
             return f"-(U[{i}] - du[{i}]) * {rate}" if is_rate else f"U[{i}] - du[{i}]"
 

@@ -8,7 +8,13 @@ from dataclasses import replace
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
-from softehl.codegen.hosts.element_interface import Before, ElementInterface, Given, Source, Timed
+from softehl.codegen.hosts.element_interface import (
+    ElementInterface,
+    PreviousValue,
+    Source,
+    TimeStepValue,
+    UserInput,
+)
 from softehl.codegen.hosts.patch_mesh import Patch
 from softehl.codegen.hosts.test_states import Sample
 
@@ -18,13 +24,13 @@ INCREMENTS = 4
 
 def program(page: ElementInterface) -> str:
     """The host itself, in Fortran."""
-    words = {
+    substitutions = {
         "name": page.name,
         "limit": _fortran(LIMIT),
         "difference": _fortran(DIFFERENCE),
-        "differences": ".false." if page.definition.given else ".true.",
+        "differences": ".false." if page.definition.prescribed else ".true.",
     }
-    return c_interface.filled(c_interface.template("uel_host.f90"), words)
+    return c_interface.filled(c_interface.template("uel_host.f90"), substitutions)
 
 
 def _fortran(value: float) -> str:
@@ -41,16 +47,16 @@ def in_time(page: ElementInterface, states: Sequence[State]) -> list[State]:
     return [_stepped(page, s, states[k - 1].dofs) for k, s in enumerate(states)]
 
 
-def _stepped(page: ElementInterface, state: State, before: Sequence[float]) -> State:
+def _stepped(page: ElementInterface, state: State, previous: Sequence[float]) -> State:
     dt = dt_of(page)
 
-    def value(source: Source, own: float) -> float:
+    def value(source: Source, default: float) -> float:
         match source:
-            case Timed(what):
+            case TimeStepValue(what):
                 return dt if what == "dt" else 1 / dt
-            case Before(place, rate):
-                return -before[place] / dt if rate else before[place]
-        return own
+            case PreviousValue(place, rate):
+                return -previous[place] / dt if rate else previous[place]
+        return default
 
     return replace(
         state,
@@ -61,11 +67,11 @@ def _stepped(page: ElementInterface, state: State, before: Sequence[float]) -> S
 
 def settings_of(page: ElementInterface, s: Sample) -> list[float]:
     """Values of the properties: those of a state."""
-    values = [0.0] * len(page.given)
+    values = [0.0] * len(page.inputs)
     pairs = [*zip(page.parameters, s.state.parameters, strict=True)]
     pairs += [*zip(page.data, s.state.data, strict=True)]
     for source, v in pairs:
-        if isinstance(source, Given):
+        if isinstance(source, UserInput):
             values[source.index] = v
     return values
 
@@ -81,24 +87,26 @@ def _renewed(page: ElementInterface, s: Sample, stored: int | None) -> list[floa
     return [*(v for row in rows for v in row), *s.fields][:stored]
 
 
-def sample_file(page: ElementInterface, found: Sequence[Sample], stored: int | None = None) -> str:
+def sample_file(
+    page: ElementInterface, references: Sequence[Sample], stored: int | None = None
+) -> str:
     """samples.txt: what the host hands over, and what the element must give back.
 
     stored: numbers that the element stores; without it, state and fields.
     """
     order, size = page.by_node(), len(page.definition.unknowns)
-    after = _renewed(page, found[0], stored)
-    head = [len(found), size, page.definition.nodes, page.dimension]
-    lines = [" ".join(map(str, (*head, len(page.given), len(after), len(found[0].fields))))]
-    for k, s in enumerate(found):
-        u, before = s.state.dofs, found[k - 1].state.dofs
+    after = _renewed(page, references[0], stored)
+    head = [len(references), size, page.definition.nodes, page.dimension]
+    lines = [" ".join(map(str, (*head, len(page.inputs), len(after), len(references[0].fields))))]
+    for k, s in enumerate(references):
+        u, previous = s.state.dofs, references[k - 1].state.dofs
         old = [v for row in s.state.point_data for v in row]
         matrix = [s.tangent[i * size + j] for j in order for i in order]
         groups = (
             [dt_of(page)],
             s.state.coordinates,
             [u[i] for i in order],
-            [u[i] - before[i] for i in order],
+            [u[i] - previous[i] for i in order],
             settings_of(page, s),
             [*old, *[0.0] * len(s.fields)][:stored],
             [-s.residual[i] for i in order],
@@ -111,25 +119,25 @@ def sample_file(page: ElementInterface, found: Sequence[Sample], stored: int | N
 
 def patch_file(page: ElementInterface, mesh: Patch, settings: Sequence[float]) -> str:
     """patch.txt: the mesh, equations of each cell, and what is held."""
-    number, fixed = patch_mesh.numbers(page, mesh), patch_mesh.held(page, mesh)
+    number, fixed = patch_mesh.numbers(page, mesh), patch_mesh.prescribed(page, mesh)
     width = page.variables
-    rest = patch_mesh.starts(page)
+    initial = patch_mesh.starts(page)
     state = [dict(page.definition.example).get(a.name, 0.0) for a in page.state]
     start = ([*state * page.points] + [0.0] * width)[:width]
-    of_place = {place: k for k, f in enumerate(page.nodal) for place in f.places}
-    nodes = [page.definition.places[i][1] for i in page.by_node()]
+    of_place = {dof: k for k, f in enumerate(page.nodal) for dof in f.dofs}
+    nodes = [page.definition.dof_nodes[i][1] for i in page.by_node()]
     head = [len(mesh.points), page.dimension, len(mesh.cells), page.definition.nodes]
-    head += [len(page.definition.unknowns), len(number), len(page.given), width, len(fixed)]
+    head += [len(page.definition.unknowns), len(number), len(page.inputs), width, len(fixed)]
     lines = [" ".join(map(str, [*head, INCREMENTS, INCREMENTS * dt_of(page)]))]
     lines += [" ".join(map(repr, p)) for p in mesh.points]
     for cell in mesh.cells:
-        places = [
+        dofs = [
             number[cell[node or 0], of_place[i]] + 1
             for i, node in zip(page.by_node(), nodes, strict=True)
         ]
-        lines.append(" ".join(str(v) for v in [*(n + 1 for n in cell), *places]))
+        lines.append(" ".join(str(v) for v in [*(n + 1 for n in cell), *dofs]))
     lines.append(" ".join(repr(float(v)) for v in settings))
     lines.append(" ".join(repr(float(v)) for v in start))
-    lines.append(" ".join(repr(rest[k]) for _, k in number))
+    lines.append(" ".join(repr(initial[k]) for _, k in number))
     lines += [f"{number[h.node, h.field] + 1} {h.value!r}" for h in fixed]
     return "\n".join(lines) + "\n"

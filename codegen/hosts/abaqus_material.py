@@ -19,15 +19,23 @@ def umat(law: Law, states: StatesOf) -> dict[str, str]:
     r = checked(r, [replace(s, data=()) for s in states(r.written)])
     texts, _ = c_interface.files(r.page, single=True)
     more, settings = shared.tests(r, states)
-    words = {**shared.words(r, "*noel"), "moduli": _moduli(r), "deformation": _deformation(r)}
-    words["density"] = "fields[0]" if r.measure is Measure.SMALL else f"fields[0] / {_VOLUME}"
-    texts["umat.c"] = c_interface.filled(c_interface.template("umat.c"), words)
-    texts["element.f90"] = c_interface.filled(c_interface.template("umat_element.f90"), words)
+    substitutions = {
+        **shared.substitutions(r, "*noel"),
+        "moduli": _moduli(r),
+        "deformation": _deformation(r),
+    }
+    substitutions["density"] = (
+        "fields[0]" if r.measure is Measure.SMALL else f"fields[0] / {_VOLUME}"
+    )
+    texts["umat.c"] = c_interface.filled(c_interface.template("umat.c"), substitutions)
+    texts["element.f90"] = c_interface.filled(
+        c_interface.template("umat_element.f90"), substitutions
+    )
     texts["Makefile"] = c_interface.filled(
         c_interface.template("abaqus.mk"),
-        {**words, "kind": "umat", "host": "tetrahedron.f90 element.f90 host.f90"},
+        {**substitutions, "kind": "umat", "host": "tetrahedron.f90 element.f90 host.f90"},
     )
-    texts["NOTES.md"] = c_interface.filled(c_interface.template("umat.md"), words)
+    texts["NOTES.md"] = c_interface.filled(c_interface.template("umat.md"), substitutions)
     texts[f"{law.name}.inp"] = _deck(r, settings)
     return texts | more
 
@@ -60,7 +68,7 @@ def _deformation(r: Response) -> str:
 
 
 def _deck(r: Response, settings: Sequence[float]) -> str:
-    nodes, elements, held = shared.block()
+    nodes, elements, constraints = shared.block()
     unsymmetric = "" if r.symmetric else ", UNSYMM"
     large = "NO" if r.measure is Measure.SMALL else "YES"
     lines = [
@@ -74,7 +82,7 @@ def _deck(r: Response, settings: Sequence[float]) -> str:
         *shared.constants(r, settings),
         *shared.depvar(r),
         f"*STEP, NLGEOM={large}{', UNSYMM=YES' if unsymmetric else ''}",
-        *("*STATIC", "0.25, 1.0", "*BOUNDARY", *held),
+        *("*STATIC", "0.25, 1.0", "*BOUNDARY", *constraints),
         *("*NODE PRINT, NSET=ALL", "U", "*EL PRINT, ELSET=CELLS", "S", "*END STEP", ""),
     ]
     return "\n".join(lines)

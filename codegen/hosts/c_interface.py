@@ -163,13 +163,13 @@ def table(name: str, values: Iterable[float], kind: str = "static const double")
     return f"{kind} {name}[] = {{\n" + "\n".join(rows) + "\n};\n"
 
 
-def filled(text: str, words: Mapping[str, object]) -> str:
+def filled(text: str, substitutions: Mapping[str, object]) -> str:
     """A text with every @word@ replaced; one that is not known is a KeyError.
 
     @finite_numbers@ is a function that several programs need.
     """
-    known = {"finite_numbers": template("finite_numbers.c"), **words}
-    return re.sub(r"@(\w+)@", lambda m: str(known[m[1]]), text)
+    values = {"finite_numbers": template("finite_numbers.c"), **substitutions}
+    return re.sub(r"@(\w+)@", lambda m: str(values[m[1]]), text)
 
 
 def template(name: str) -> str:

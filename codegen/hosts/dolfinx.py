@@ -17,19 +17,19 @@ def module(law: Law, states: StatesOf) -> dict[str, str]:
     """Every file of a material for forms of DOLFINx."""
     page, small = ElementInterface(point(law)), is_small(law)
     texts, kernel = c_interface.files(page)
-    found = samples(page, kernel, states(page.definition))
-    words = _words(page, found[0], small)
+    references = samples(page, kernel, states(page.definition))
+    substitutions = _substitutions(page, references[0], small)
     texts[f"{law.name}_dolfinx.py"] = c_interface.filled(
-        c_interface.template("dolfinx.py.in"), words
+        c_interface.template("dolfinx.py.in"), substitutions
     )
     texts[f"test_{law.name}.py"] = c_interface.filled(
-        c_interface.template("dolfinx_test.py.in"), words
+        c_interface.template("dolfinx_test.py.in"), substitutions
     )
-    texts["Makefile"] = c_interface.filled(c_interface.template("dolfinx.mk"), words)
-    texts["NOTES.md"] = c_interface.filled(c_interface.template("dolfinx.md"), words)
+    texts["Makefile"] = c_interface.filled(c_interface.template("dolfinx.mk"), substitutions)
+    texts["NOTES.md"] = c_interface.filled(c_interface.template("dolfinx.md"), substitutions)
     values = {
-        "p": [float(v) for v in found[0].state.parameters],
-        "states": [_state(page, s, small) for s in found],
+        "p": [float(v) for v in references[0].state.parameters],
+        "states": [_state(page, s, small) for s in references],
     }
     texts["samples.json"] = json.dumps(values) + "\n"
     return texts
@@ -38,7 +38,7 @@ def module(law: Law, states: StatesOf) -> dict[str, str]:
 DOLFINX = Host(material=module)
 
 
-def _words(page: ElementInterface, first: Sample, small: bool) -> dict[str, object]:
+def _substitutions(page: ElementInterface, first: Sample, small: bool) -> dict[str, object]:
     d = page.definition
     pairs = zip(d.parameters, first.state.parameters, strict=True)
     return {
@@ -63,8 +63,10 @@ def _state(page: ElementInterface, s: Sample, small: bool) -> dict[str, object]:
     new = [v if k is None else s.fields[k] for k, v in zip(page.renewed, old, strict=True)]
 
     def tensor(row: list[float], shear: float) -> list[list[float]]:
-        places = {p: v * (1 if p[0] == p[1] else shear) for p, v in zip(VOIGT, row, strict=True)}
-        return [[places[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
+        components = {
+            p: v * (1 if p[0] == p[1] else shear) for p, v in zip(VOIGT, row, strict=True)
+        }
+        return [[components[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
 
     row = [float(v) for v in values]
     if small:

@@ -18,35 +18,35 @@ from softehl.codegen.language.definition import Argument, Definition
 
 @dataclass(frozen=True)
 class NodalUnknown:
-    """Unknowns of one name: `places` are their numbers at the nodes 0, 1, ... of the element."""
+    """Unknowns of one name: `dofs` are their numbers at the nodes 0, 1, ... of the element."""
 
     name: str
-    places: tuple[int, ...]
+    dofs: tuple[int, ...]
 
 
 @dataclass(frozen=True)
-class Given:
+class UserInput:
     """An argument that a user gives: number `index` of his list."""
 
     index: int
 
 
 @dataclass(frozen=True)
-class Timed:
+class TimeStepValue:
     """An argument from the step in time: its length `dt`, or `rate`, which is 1 / dt."""
 
     what: str
 
 
 @dataclass(frozen=True)
-class Before:
-    """A datum from the values before the step: of unknown `place`, or (`rate`) minus it by dt."""
+class PreviousValue:
+    """A datum from the values before the step: of unknown `dof`, or (`rate`) minus it by dt."""
 
-    place: int
+    dof: int
     rate: bool
 
 
-Source = Given | Timed | Before
+Source = UserInput | TimeStepValue | PreviousValue
 
 
 @dataclass(frozen=True)
@@ -120,42 +120,42 @@ class ElementInterface:
     @cached_property
     def nodal(self) -> tuple[NodalUnknown, ...]:
         """Unknowns that stand at nodes, by name, in the order of the page."""
-        found: dict[str, list[int]] = {}
-        for place, (name, node) in enumerate(self.definition.places):
+        by_name: dict[str, list[int]] = {}
+        for dof, (name, node) in enumerate(self.definition.dof_nodes):
             if node is not None:
-                found.setdefault(name, []).append(place)
-        return tuple(NodalUnknown(name, tuple(places)) for name, places in found.items())
+                by_name.setdefault(name, []).append(dof)
+        return tuple(NodalUnknown(name, tuple(dofs)) for name, dofs in by_name.items())
 
     @cached_property
     def free(self) -> tuple[str, ...]:
         """Unknowns that belong to the element alone."""
-        return tuple(name for name, node in self.definition.places if node is None)
+        return tuple(name for name, node in self.definition.dof_nodes if node is None)
 
     @cached_property
     def vector(self) -> tuple[int, ...]:
         """Numbers in `nodal` of the components of the first vector: the displacements."""
         first = [
-            place
+            dof
             for start, width in self.definition.nodal
             if width == self.dimension
-            for place in range(start, start + width)
+            for dof in range(start, start + width)
         ]
-        found = [k for k, f in enumerate(self.nodal) if f.places[0] in first]
-        return tuple(found[: self.dimension])
+        components = [k for k, f in enumerate(self.nodal) if f.dofs[0] in first]
+        return tuple(components[: self.dimension])
 
     def at_node(self, node: int) -> list[int]:
         """Numbers of the unknowns at a node, in the order of the names."""
-        return [f.places[node] for f in self.nodal if node < len(f.places)]
+        return [f.dofs[node] for f in self.nodal if node < len(f.dofs)]
 
     def by_node(self) -> list[int]:
         """Numbers of the unknowns, node after node."""
-        return [place for node in range(self.definition.nodes) for place in self.at_node(node)]
+        return [dof for node in range(self.definition.nodes) for dof in self.at_node(node)]
 
     # arguments ----------------------------------------------------------------------------------
 
     @cached_property
     def _sources(self) -> tuple[list[Source], list[Source], list[Argument]]:
-        d, given = self.definition, list[Argument]()
+        d, inputs = self.definition, list[Argument]()
         old = dict(_previous(d, "_old"))
         rates = dict(_previous(d, "_rate")) if "rate" in {a.name for a in d.parameters} else {}
         timed = {"dt", "rate"} if rates else {"dt"}
@@ -163,12 +163,14 @@ class ElementInterface:
         def source(a: Argument, filled: Mapping[str, Source]) -> Source:
             if a.name in filled:
                 return filled[a.name]
-            given.append(a)
-            return Given(len(given) - 1)
+            inputs.append(a)
+            return UserInput(len(inputs) - 1)
 
-        parameters = [source(a, {name: Timed(name) for name in timed}) for a in d.parameters]
+        parameters = [
+            source(a, {name: TimeStepValue(name) for name in timed}) for a in d.parameters
+        ]
         data = [source(a, {**old, **rates}) for a in d.data]
-        return parameters, data, given
+        return parameters, data, inputs
 
     @property
     def parameters(self) -> list[Source]:
@@ -181,7 +183,7 @@ class ElementInterface:
         return self._sources[1]
 
     @property
-    def given(self) -> list[Argument]:
+    def inputs(self) -> list[Argument]:
         """Parameters, then data, that a user gives."""
         return self._sources[2]
 
@@ -208,8 +210,8 @@ class ElementInterface:
         return any(k is not None for k in self.renewed)
 
 
-def _previous(d: Definition, suffix: str) -> Iterator[tuple[str, Before]]:
+def _previous(d: Definition, suffix: str) -> Iterator[tuple[str, PreviousValue]]:
     """Data such as u_old1 (for an unknown u at node 1) and the unknown whose value before it is."""
-    for place, (name, node) in enumerate(d.places):
+    for dof, (name, node) in enumerate(d.dof_nodes):
         if node is not None:
-            yield f"{name}{suffix}{node + 1}", Before(place, suffix == "_rate")
+            yield f"{name}{suffix}{node + 1}", PreviousValue(dof, suffix == "_rate")

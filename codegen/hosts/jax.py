@@ -21,23 +21,26 @@ def module(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     page.require("jax", Task.RESIDUAL, Task.TANGENT)
     page = with_derivatives(page)
     texts, kernel = c_interface.files(page)
-    found = samples(page, kernel, states)
-    words = _words(page, found[0])
+    references = samples(page, kernel, states)
+    substitutions = _substitutions(page, references[0])
     texts["jax_ops.cc"] = c_interface.filled(
-        c_interface.template("jax.cc"), {**words, "operations": "\n".join(_operations(page))}
+        c_interface.template("jax.cc"),
+        {**substitutions, "operations": "\n".join(_operations(page))},
     )
     parts = "".join(c_interface.template(f"jax_{t}.py.in") for t in _parts(page))
     module = c_interface.template("jax.py.in").replace("@functions@\n", parts)
-    texts[f"{page.name}_jax.py"] = c_interface.filled(module, words).rstrip() + "\n"
+    texts[f"{page.name}_jax.py"] = c_interface.filled(module, substitutions).rstrip() + "\n"
     texts[f"test_{page.name}.py"] = c_interface.filled(
-        c_interface.template("jax_test.py.in"), words
+        c_interface.template("jax_test.py.in"), substitutions
     )
-    texts["equilibrium.py"] = c_interface.filled(c_interface.template("equilibrium.py.in"), words)
+    texts["equilibrium.py"] = c_interface.filled(
+        c_interface.template("equilibrium.py.in"), substitutions
+    )
     if page.cell is not None and page.nodal and not page.free:
         texts["patch.json"] = _patch_file(page)
-    texts["samples.json"] = _sample_file(found)
-    texts["Makefile"] = c_interface.filled(c_interface.template("jax.mk"), words)
-    texts["NOTES.md"] = c_interface.filled(c_interface.template("jax.md"), words)
+    texts["samples.json"] = _sample_file(references)
+    texts["Makefile"] = c_interface.filled(c_interface.template("jax.mk"), substitutions)
+    texts["NOTES.md"] = c_interface.filled(c_interface.template("jax.md"), substitutions)
     return texts
 
 
@@ -53,8 +56,8 @@ def with_derivatives(page: ElementInterface) -> ElementInterface:
 
 
 def _parts(page: ElementInterface) -> list[str]:
-    own = [t for t in (Task.ENERGY, Task.FIELDS) if t in page.tasks]
-    return [*own, Task.RESIDUAL]
+    optional = [t for t in (Task.ENERGY, Task.FIELDS) if t in page.tasks]
+    return [*optional, Task.RESIDUAL]
 
 
 def _tasks(page: ElementInterface) -> list[str]:
@@ -83,7 +86,7 @@ def _operations(page: ElementInterface) -> list[str]:
     return texts
 
 
-def _words(page: ElementInterface, first: Sample) -> dict[str, object]:
+def _substitutions(page: ElementInterface, first: Sample) -> dict[str, object]:
     d, sizes = page.definition, c_interface.sizes(page)
     has_energy = Task.ENERGY in page.tasks
     pairs = zip(d.parameters, first.state.parameters, strict=True)
@@ -112,17 +115,17 @@ def _words(page: ElementInterface, first: Sample) -> dict[str, object]:
     }
 
 
-def _sample_file(found: Sequence[Sample]) -> str:
-    size = len(found[0].state.dofs)
+def _sample_file(references: Sequence[Sample]) -> str:
+    size = len(references[0].state.dofs)
     values = {
-        "X": [list(map(float, s.state.coordinates)) for s in found],
-        "u": [list(map(float, s.state.dofs)) for s in found],
-        "data": [s.data for s in found],
-        "p": list(map(float, found[0].state.parameters)),
-        "energy": [v for s in found for v in s.energy],
-        "residual": [s.residual for s in found],
-        "tangent": [[s.tangent[k : k + size] for k in range(0, size**2, size)] for s in found],
-        "fields": [s.fields for s in found],
+        "X": [list(map(float, s.state.coordinates)) for s in references],
+        "u": [list(map(float, s.state.dofs)) for s in references],
+        "data": [s.data for s in references],
+        "p": list(map(float, references[0].state.parameters)),
+        "energy": [v for s in references for v in s.energy],
+        "residual": [s.residual for s in references],
+        "tangent": [[s.tangent[k : k + size] for k in range(0, size**2, size)] for s in references],
+        "fields": [s.fields for s in references],
     }
     return json.dumps(values) + "\n"
 
@@ -131,21 +134,21 @@ def _patch_file(page: ElementInterface) -> str:
     """A patch of cells: places, numbers of unknowns, and what is held."""
     assert page.cell is not None
     mesh = patch_mesh.patch(page.cell)
-    number, fixed, rest = (
+    number, fixed, initial = (
         patch_mesh.numbers(page, mesh),
-        patch_mesh.held(page, mesh),
+        patch_mesh.prescribed(page, mesh),
         patch_mesh.starts(page),
     )
     dofs = [[0] * len(page.definition.unknowns) for _ in mesh.cells]
     for row, cell in zip(dofs, mesh.cells, strict=True):
         for k, f in enumerate(page.nodal):
-            for node, place in enumerate(f.places):
-                row[place] = number[cell[node], k]
+            for node, dof in enumerate(f.dofs):
+                row[dof] = number[cell[node], k]
     values = {
         "X": [[c for n in cell for c in mesh.points[n]] for cell in mesh.cells],
         "dofs": dofs,
         "fixed": [number[h.node, h.field] for h in fixed],
         "values": [h.value for h in fixed],
-        "start": [rest[k] for _, k in number],
+        "start": [initial[k] for _, k in number],
     }
     return json.dumps(values) + "\n"

@@ -25,7 +25,7 @@ PULL, TWIST = 0.2, 0.3
 """Stretch of the block in a deck, and its twist by shear."""
 
 
-def words(r: Response, element: str) -> dict[str, object]:
+def substitutions(r: Response, element: str) -> dict[str, object]:
     """Words of the texts of a host; element: C of the number of the element."""
     page = r.page
     outputs = _outputs(r)
@@ -42,7 +42,7 @@ def words(r: Response, element: str) -> dict[str, object]:
         "state": ", ".join(a.name for a in page.state) or "none",
         "outputs": ", ".join(outputs) or "none",
         "output": len(outputs),
-        "own": r.own,
+        "own": r.first_law_field,
         "depvar": len(page.state) + len(outputs),
         "small": ".true." if small else ".false.",
         "properties": "\n".join(rows) or "| | none |",
@@ -56,7 +56,7 @@ def words(r: Response, element: str) -> dict[str, object]:
 def _outputs(r: Response) -> list[str]:
     """Fields that the law gives, without its history."""
     d = r.definition
-    return [name for name, _ in d.fields[r.own : len(d.fields) - len(d.history)]]
+    return [name for name, _ in d.fields[r.first_law_field : len(d.fields) - len(d.history)]]
 
 
 def _history(page: ElementInterface) -> Iterable[str]:
@@ -68,7 +68,7 @@ def _history(page: ElementInterface) -> Iterable[str]:
 
 def depvar(r: Response) -> list[str]:
     """Lines of a deck with the number of state variables."""
-    return ["*DEPVAR", str(n)] if (n := words(r, "")["depvar"]) else []
+    return ["*DEPVAR", str(n)] if (n := substitutions(r, "")["depvar"]) else []
 
 
 def tests(r: Response, states: StatesOf) -> tuple[dict[str, str], list[float]]:
@@ -76,14 +76,14 @@ def tests(r: Response, states: StatesOf) -> tuple[dict[str, str], list[float]]:
     d = solid(r.law)
     page = ElementInterface(replace(d, tasks=(Task.TANGENT, Task.FIELDS)[: 1 + bool(d.fields)]))
     kernel = compile_model(page.definition)
-    found = samples(page, kernel, host.in_time(page, states(page.definition)))
-    settings = host.settings_of(page, found[0])
+    references = samples(page, kernel, host.in_time(page, states(page.definition)))
+    settings = host.settings_of(page, references[0])
     stored = len(page.state) + len(_outputs(r))
     assert page.cell is not None
     return {
         "tetrahedron.f90": c_interface.template("tetrahedron.f90"),
         "host.f90": host.program(page),
-        "samples.txt": host.sample_file(page, found, stored),
+        "samples.txt": host.sample_file(page, references, stored),
         "patch.txt": host.patch_file(_from_zero(page), patch_mesh.patch(page.cell), settings),
     }, settings
 
@@ -102,12 +102,12 @@ def block(count: int = 2) -> tuple[list[str], list[str], list[str]]:
     elements = [
         f"{n + 1}, {', '.join(str(k + 1) for k in cell)}" for n, cell in enumerate(mesh.cells)
     ]
-    held = [f"{n + 1}, 1, 3, 0.0" for n in mesh.left]
+    constraints = [f"{n + 1}, 1, 3, 0.0" for n in mesh.left]
     for n in mesh.right:
         _, y, z = mesh.points[n]
         moves = (PULL, -TWIST * (z - 1.5), TWIST * (y - 1.5))
-        held += [f"{n + 1}, {k + 1}, {k + 1}, {v!r}" for k, v in enumerate(moves)]
-    return nodes, elements, held
+        constraints += [f"{n + 1}, {k + 1}, {k + 1}, {v!r}" for k, v in enumerate(moves)]
+    return nodes, elements, constraints
 
 
 def constants(r: Response, values: Sequence[float]) -> list[str]:

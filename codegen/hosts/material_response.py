@@ -63,10 +63,10 @@ class Response:
     @property
     def parameters(self) -> list[Argument]:
         """Constants of the material: all parameters but the length of the step."""
-        return self.page.given
+        return self.page.inputs
 
     @property
-    def own(self) -> int:
+    def first_law_field(self) -> int:
         """Number of the first field that is the law's own."""
         return 7 + (21 if self.symmetric else 36)
 
@@ -101,20 +101,20 @@ def response(law: Law, measure: Measure) -> Response:
     else:
         inverse = m.define("F0_inverse", F0.adjugate() / F0.det(method="berkowitz"))
         F = m.define("F", F0 + inverse.T * E)
-    found = law.on(m, F)
-    P = _first(m, found, F)
+    material = law.on(m, F)
+    P = _first(m, material, F)
     if measure is Measure.CAUCHY:
         stress, volume = P * F.T, m.define("J0", F0.det(method="berkowitz"))
     else:
         stress, volume = m.define("F_inverse", F.adjugate() / F.det(method="berkowitz")) * P, 1
     values = [m.define(f"tau_{i}{j}", stress[i, j]) for i, j in VOIGT]
     moduli = [[c / volume for c in m.derivative(f"C_{k}", v, steps)] for k, v in enumerate(values)]
-    m.fields(**_named(found, [v / volume for v in values], moduli))
+    m.fields(**_named(material, [v / volume for v in values], moduli))
     m.fields(**{f"skew{i}{j}": stress[i, j] - stress[j, i] for i, j in VOIGT[3:]})
     m.example(F11=1, F22=1, F33=1, **{str(s): 0 for s in steps})
-    _close(m, found, list(P), list(F))
+    _close(m, material, list(P), list(F))
     d = _ordered(m.finish())
-    return Response(law, measure, _at_rest(d), d, found.W is not None)
+    return Response(law, measure, _at_rest(d), d, material.W is not None)
 
 
 def _tensor(strains: Sequence[Any]) -> Any:
@@ -138,8 +138,8 @@ def _named(law: Material, stress: Sequence[Any], moduli: Sequence[Sequence[Any]]
 
 def _ordered(d: Definition) -> Definition:
     """The definition with the fields of the law behind those of the host."""
-    ours = re.compile(r"W|s\d|C\d\d|skew\d\d")
-    fields = sorted(d.fields, key=lambda field: ours.fullmatch(field[0]) is None)
+    host_field = re.compile(r"W|s\d|C\d\d|skew\d\d")
+    fields = sorted(d.fields, key=lambda field: host_field.fullmatch(field[0]) is None)
     return replace(d, fields=tuple(fields))
 
 
@@ -172,18 +172,18 @@ def _close(m: Model, law: Material, P: Sequence[Any], F: Sequence[Any]) -> None:
 
 def _small(law: Law, m: Model) -> Response:
     strains = [m.unknown(f"e{i + 1}{j + 1}") for i, j in VOIGT]
-    found = law.on(m, sp.eye(3) + _tensor(strains))
-    if found.W is not None:
-        stress = m.derivative("s", found.W, strains)
+    material = law.on(m, sp.eye(3) + _tensor(strains))
+    if material.W is not None:
+        stress = m.derivative("s", material.W, strains)
     else:
-        stress = [m.define(f"stress_{i}{j}", found.P[i, j]) for i, j in VOIGT]
+        stress = [m.define(f"stress_{i}{j}", material.P[i, j]) for i, j in VOIGT]
     moduli = [m.derivative(f"C_{k}", v, strains) for k, v in enumerate(stress)]
-    m.fields(**_named(found, stress, moduli))
-    if found.P is not None:
-        m.fields(**{f"skew{i}{j}": found.P[i, j] - found.P[j, i] for i, j in VOIGT[3:]})
-    _close(m, found, stress, strains)
+    m.fields(**_named(material, stress, moduli))
+    if material.P is not None:
+        m.fields(**{f"skew{i}{j}": material.P[i, j] - material.P[j, i] for i, j in VOIGT[3:]})
+    _close(m, material, stress, strains)
     d = _ordered(m.finish())
-    return Response(law, Measure.SMALL, _at_rest(d), d, found.W is not None)
+    return Response(law, Measure.SMALL, _at_rest(d), d, material.W is not None)
 
 
 def checked(r: Response, states: Sequence[State]) -> Response:
@@ -226,10 +226,12 @@ def packed(r: Response, states: Sequence[State]) -> Response:
 def point(law: Law) -> Definition:
     """The law as a page of one point: the residual is its stress, the tangent its modulus."""
     small = is_small(law)
-    told = "Unknowns: strains (shears twice), residual: stress, tangent: modulus."
+    meaning = "Unknowns: strains (shears twice), residual: stress, tangent: modulus."
     if not small:
-        told = "Unknowns: F row by row, residual: first Piola-Kirchhoff stress P, tangent: dP/dF."
-    m = Model(law.name, nodes=1, rule=quadrature.point_rule(), doc=f"{law.doc} {told}")
+        meaning = (
+            "Unknowns: F row by row, residual: first Piola-Kirchhoff stress P, tangent: dP/dF."
+        )
+    m = Model(law.name, nodes=1, rule=quadrature.point_rule(), doc=f"{law.doc} {meaning}")
     if small:
         unknowns = [m.unknown(f"e{i + 1}{j + 1}") for i, j in VOIGT]
         F = sp.eye(3) + _tensor(unknowns)
@@ -237,10 +239,10 @@ def point(law: Law) -> Definition:
         unknowns = [m.unknown(f"F{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)]
         F = sp.Matrix(3, 3, unknowns)
         m.example(F11=1, F22=1, F33=1)
-    found = law.on(m, F)
-    stress = [found.P[p] for p in VOIGT] if small and found.P is not None else found.P
+    material = law.on(m, F)
+    stress = [material.P[p] for p in VOIGT] if small and material.P is not None else material.P
     P = [] if stress is None else [m.define(f"P_{k}", v) for k, v in enumerate(stress)]
-    _close(m, found, P, unknowns)
+    _close(m, material, P, unknowns)
     return m.finish()
 
 
@@ -257,11 +259,11 @@ def solid(law: Law, name: str = "tet4") -> Definition:
     X, u = m.coordinates("X", "Y", "Z"), m.nodal_unknowns("u_x", "u_y", "u_z")
     e = kinematics.isoparametric(m, X, kind.gradient(*m.point()), "parent_")
     F = kinematics.deformation_gradient(m, e.dN, u)
-    found = law.on(m, F)
-    if found.W is not None:
-        m.potential(m.integral("Pi", found.W * e.detJ))
+    material = law.on(m, F)
+    if material.W is not None:
+        m.potential(m.integral("Pi", material.W * e.detJ))
     else:
-        m.weak_form([(found.P[k] * e.detJ, F[k]) for k in range(9)])
+        m.weak_form([(material.P[k] * e.detJ, F[k]) for k in range(9)])
     return m.finish()
 
 

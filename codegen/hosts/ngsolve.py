@@ -13,7 +13,7 @@ from softehl.codegen.elements.element import Element
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, patch_mesh
-from softehl.codegen.hosts.element_interface import ElementInterface, Given
+from softehl.codegen.hosts.element_interface import ElementInterface, UserInput
 from softehl.codegen.hosts.registry import Host
 from softehl.codegen.hosts.test_states import Sample, samples
 
@@ -41,14 +41,14 @@ def module(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     kind = _kind(page)
     texts, kernel = c_interface.files(page, single=True)
     texts = _many(page) | texts
-    words = _words(page, kind, samples(page, kernel, states)[0])
-    texts["ngsolve.cpp"] = c_interface.filled(c_interface.template("ngsolve.cpp"), words)
-    texts["form.hpp"] = c_interface.filled(c_interface.template("ngsolve_form.hpp"), words)
+    substitutions = _substitutions(page, kind, samples(page, kernel, states)[0])
+    texts["ngsolve.cpp"] = c_interface.filled(c_interface.template("ngsolve.cpp"), substitutions)
+    texts["form.hpp"] = c_interface.filled(c_interface.template("ngsolve_form.hpp"), substitutions)
     texts[f"test_{page.name}.py"] = c_interface.filled(
-        c_interface.template("ngsolve_test.py.in"), words
+        c_interface.template("ngsolve_test.py.in"), substitutions
     )
-    texts["Makefile"] = c_interface.filled(c_interface.template("ngsolve.mk"), words)
-    texts["NOTES.md"] = c_interface.filled(c_interface.template("ngsolve.md"), words)
+    texts["Makefile"] = c_interface.filled(c_interface.template("ngsolve.mk"), substitutions)
+    texts["NOTES.md"] = c_interface.filled(c_interface.template("ngsolve.md"), substitutions)
     return texts
 
 
@@ -75,17 +75,17 @@ def _kind(page: ElementInterface) -> Element:
         "unknowns of the element alone": page.free,
         "data of points": [a.name for a in page.state],
         "values of a step in time": [
-            s for s in (*page.parameters, *page.data) if not isinstance(s, Given)
+            s for s in (*page.parameters, *page.data) if not isinstance(s, UserInput)
         ],
     }
-    for what, found in missing.items():
-        if found:
+    for what, present in missing.items():
+        if present:
             raise TargetError(f"{page.name} has {what}, which target ngsolve cannot hold")
     corners = len(_corners(kind).nodes)
-    wrong = [f.name for f in page.nodal if len(f.places) not in (corners, len(kind.nodes))]
-    if wrong:
+    partial = [f.name for f in page.nodal if len(f.dofs) not in (corners, len(kind.nodes))]
+    if partial:
         raise TargetError(
-            f"{page.name}: {wrong[0]} is neither at all nodes nor at all corners, as spaces of "
+            f"{page.name}: {partial[0]} is neither at all nodes nor at all corners, as spaces of "
             "target ngsolve are"
         )
     return kind
@@ -100,9 +100,9 @@ def _parent(kind: Element) -> list[list[float]]:
     """Places of the nodes in NGSolve's parent cell, between 0 and 1."""
     scaled = {"tri": 0, "tet": 0, "wedge": 1}.get(kind.name.rstrip("0123456789"), 3)
     rows = []
-    for place in kind.nodes:
-        first = len(place) - scaled if scaled < 3 else 0
-        rows.append([float((1 + c) / 2 if k >= first else c) for k, c in enumerate(place)])
+    for node in kind.nodes:
+        first = len(node) - scaled if scaled < 3 else 0
+        rows.append([float((1 + c) / 2 if k >= first else c) for k, c in enumerate(node)])
     return rows
 
 
@@ -114,7 +114,7 @@ def _space(page: ElementInterface, order: int) -> str:
     """The space as a line of Python."""
     full = page.definition.nodes
     parts = []
-    for count, group in groupby(page.nodal, lambda f: len(f.places)):
+    for count, group in groupby(page.nodal, lambda f: len(f.dofs)):
         names = list(group)
         degree = order if count == full else 1
         while names:
@@ -124,10 +124,10 @@ def _space(page: ElementInterface, order: int) -> str:
     return " * ".join(parts)
 
 
-def _words(page: ElementInterface, kind: Element, first: Sample) -> dict[str, object]:
+def _substitutions(page: ElementInterface, kind: Element, first: Sample) -> dict[str, object]:
     d, (name, order) = page.definition, KINDS[kind.name]
     parent = _parent(kind)
-    pairs = zip(page.given, host.settings_of(page, first), strict=True)
+    pairs = zip(page.inputs, host.settings_of(page, first), strict=True)
     settings = {a.name: v for a, v in pairs}
     has_energy, has_residual = (t in page.tasks for t in (Task.ENERGY, Task.RESIDUAL))
     return {
@@ -139,8 +139,8 @@ def _words(page: ElementInterface, kind: Element, first: Sample) -> dict[str, ob
         "unknowns": ", ".join(f.name for f in page.nodal),
         "nodes": ",\n".join(_braces(parent)),
         "mirrored": ", ".join(str(_index(parent, _mirrored(r))) for r in parent),
-        "counts": ", ".join(str(len(f.places)) for f in page.nodal),
-        "places": ",\n".join(f"    {{{', '.join(map(str, f.places))}}}" for f in page.nodal),
+        "counts": ", ".join(str(len(f.dofs)) for f in page.nodal),
+        "places": ",\n".join(f"    {{{', '.join(map(str, f.dofs))}}}" for f in page.nodal),
         "symmetric": "true" if page.symmetric else "false",
         "symmetry": ", symmetric=True" if page.symmetric else "",
         "residual": f"{page.name}_residual(1, e.X, e.u, e.data, e.p, R);"
@@ -163,17 +163,17 @@ def _words(page: ElementInterface, kind: Element, first: Sample) -> dict[str, ob
 
 def _of_test(page: ElementInterface, kind: Element, first: Sample) -> dict[str, Any]:
     d, corner = page.definition, _corners(kind)
-    weights = [[float(N) for N in corner.shape(*place)] for place in kind.nodes]
+    weights = [[float(N) for N in corner.shape(*node)] for node in kind.nodes]
     image = [tuple(_mirrored([float(c) for c in p])) for p in corner.nodes]
-    own = [tuple(float(c) for c in p) for p in corner.nodes]
-    mirror = [own.index(p) for p in image] if page.dimension > 1 else [1, 0]
-    edges = [_neighbour(own, k) for k in range(page.dimension)]
+    corners = [tuple(float(c) for c in p) for p in corner.nodes]
+    mirror = [corners.index(p) for p in image] if page.dimension > 1 else [1, 0]
+    edges = [_neighbour(corners, k) for k in range(page.dimension)]
     return {
         "dimension": page.dimension,
         "nodes_count": d.nodes,
         "unknowns_count": len(d.unknowns),
         "corners": weights,
-        "place_lists": [list(f.places) for f in page.nodal],
+        "place_lists": [list(f.dofs) for f in page.nodal],
         "mirror": mirror,
         "jacobian": f"np.array([X[k] - X[0] for k in {edges}])[:, :DIM]",
         "rest": patch_mesh.starts(page),
@@ -183,22 +183,22 @@ def _of_test(page: ElementInterface, kind: Element, first: Sample) -> dict[str, 
     }
 
 
-def _neighbour(places: Sequence[tuple[float, ...]], direction: int) -> int:
+def _neighbour(points: Sequence[tuple[float, ...]], direction: int) -> int:
     """The corner that lies from the first one along a direction."""
     return next(
         n
-        for n, p in enumerate(places)
-        if p[direction] > places[0][direction]
-        and all(a == b for k, (a, b) in enumerate(zip(p, places[0], strict=True)) if k != direction)
+        for n, p in enumerate(points)
+        if p[direction] > points[0][direction]
+        and all(a == b for k, (a, b) in enumerate(zip(p, points[0], strict=True)) if k != direction)
     )
 
 
-def _index(places: Sequence[Sequence[float]], place: Sequence[float]) -> int:
+def _index(points: Sequence[Sequence[float]], point: Sequence[float]) -> int:
     """Number of the node at a place."""
     return next(
         n
-        for n, p in enumerate(places)
-        if all(abs(a - b) < 1e-9 for a, b in zip(p, place, strict=True))
+        for n, p in enumerate(points)
+        if all(abs(a - b) < 1e-9 for a, b in zip(p, point, strict=True))
     )
 
 

@@ -38,15 +38,15 @@ def patch(kind: Element, count: int | None = None) -> Patch:
     cells = []
     for corner in product(range(count), repeat=kind.dimension):
         for to_cube in _parts(kind):
-            places = [to_cube(_exact(p)) for p in kind.nodes]
-            moved = [tuple((c + x) / count for c, x in zip(corner, p, strict=True)) for p in places]
+            points = [to_cube(_exact(p)) for p in kind.nodes]
+            moved = [tuple((c + x) / count for c, x in zip(corner, p, strict=True)) for p in points]
             cells.append([number.setdefault(p, len(number)) for p in moved])
-    ends = [[k for p, k in number.items() if p[0] == end] for end in (0, 1)]
-    return Patch([_distorted(p) for p in number], cells, ends[0], ends[1])
+    end_nodes = [[k for p, k in number.items() if p[0] == end] for end in (0, 1)]
+    return Patch([_distorted(p) for p in number], cells, end_nodes[0], end_nodes[1])
 
 
-def _exact(place: tuple[object, ...]) -> Place:
-    return tuple(Fraction(str(c)) for c in place)
+def _exact(point: tuple[object, ...]) -> Place:
+    return tuple(Fraction(str(c)) for c in point)
 
 
 def _parts(kind: Element) -> Iterator[Map]:
@@ -95,9 +95,9 @@ def _simplices(d: int) -> Iterator[Map]:
         yield affine
 
 
-def _distorted(place: Place) -> list[float]:
+def _distorted(point: Place) -> list[float]:
     """A smooth map of the unit cube that keeps the ends of the first direction apart."""
-    x = [float(c) for c in place]
+    x = [float(c) for c in point]
     bend = 0.1 * sum((k + 1) * c * (1 - c) for k, c in enumerate(x))
     return [1 + c + bend * (0.3 if k == 0 else c) for k, c in enumerate(x)]
 
@@ -113,21 +113,23 @@ class Held:
 
 def starts(page: ElementInterface) -> list[float]:
     """Value at rest of each name: that of the page's example at node 1, else zero."""
-    given = dict(page.definition.example)
+    example = dict(page.definition.example)
     names = page.definition.unknowns
-    return [given.get(names[f.places[0]], 0.0) for f in page.nodal]
+    return [example.get(names[f.dofs[0]], 0.0) for f in page.nodal]
 
 
-def held(page: ElementInterface, mesh: Patch) -> list[Held]:
-    """Values held on both ends: of every name that stands at all nodes."""
-    full = [k for k, f in enumerate(page.nodal) if len(f.places) == page.definition.nodes]
-    rest = starts(page)
+def prescribed(page: ElementInterface, mesh: Patch) -> list[Held]:
+    """Values held on both sides: of every name that stands at all nodes."""
+    full = [k for k, f in enumerate(page.nodal) if len(f.dofs) == page.definition.nodes]
+    initial = starts(page)
     first = full[0] if full else -1
-    pulled = {k: PULL * max(1.0, abs(rest[k])) for k in full if k == first or k not in page.vector}
-    ends = ((mesh.left, dict.fromkeys(full, 0.0)), (mesh.right, pulled))
+    pulled = {
+        k: PULL * max(1.0, abs(initial[k])) for k in full if k == first or k not in page.vector
+    }
+    sides = ((mesh.left, dict.fromkeys(full, 0.0)), (mesh.right, pulled))
     return [
-        Held(node, k, rest[k] + values.get(k, 0.0))
-        for nodes, values in ends
+        Held(node, k, initial[k] + values.get(k, 0.0))
+        for nodes, values in sides
         for node in nodes
         for k in full
     ]
@@ -135,10 +137,10 @@ def held(page: ElementInterface, mesh: Patch) -> list[Held]:
 
 def numbers(page: ElementInterface, mesh: Patch) -> dict[tuple[int, int], int]:
     """Equation of each (node, number of the name), node after node."""
-    there: dict[tuple[int, int], None] = {}
+    occupied: dict[tuple[int, int], None] = {}
     for cell in mesh.cells:
-        for node, place in enumerate(cell):
-            there.update(
-                {(place, k): None for k, f in enumerate(page.nodal) if node < len(f.places)}
+        for node, dof in enumerate(cell):
+            occupied.update(
+                {(dof, k): None for k, f in enumerate(page.nodal) if node < len(f.dofs)}
             )
-    return {key: n for n, key in enumerate(sorted(there))}
+    return {key: n for n, key in enumerate(sorted(occupied))}

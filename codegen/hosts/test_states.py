@@ -74,7 +74,7 @@ def _entries(page: ElementInterface, kernel: KernelSource, task: str) -> list[En
         return []
     function = kernel.functions[task]
     at_point = function.printer == "points"
-    return outputs(page.definition, task) if at_point else function.chosen.entries
+    return outputs(page.definition, task) if at_point else function.best.entries
 
 
 def samples(page: ElementInterface, kernel: KernelSource, states: Sequence[State]) -> list[Sample]:

@@ -23,8 +23,8 @@ class NeedsTraces(ModelError):  # noqa: N818 (named after what it is)
     traces = True
 
     def __init__(self, what: str) -> None:
-        words = 'on a side there are values of fields, no gradients, but with cell="quad4_side"'
-        super().__init__(f"{what}: {words}")
+        remedy = 'on a side there are values of fields, no gradients, but with cell="quad4_side"'
+        super().__init__(f"{what}: {remedy}")
 
 
 class BoundaryModel(NodalFields):
@@ -51,17 +51,17 @@ class BoundaryModel(NodalFields):
         """
         if getattr(u, "shape", None) != (self.dimension, 1):
             raise ModelError(f"area_vector: a vector of {self.dimension} is needed, as of m.vector")
-        known = [self._traced.get(v) for v in Entries.of(u).values]
-        if any(t is None for t in known):
+        traces = [self._traced.get(v) for v in Entries.of(u).values]
+        if any(t is None for t in traces):
             raise ModelError(f"area_vector: {u} is no field")
         moved = [
-            [x[k] + t.slopes[k] for x, t in zip(self._tangents, known, strict=True) if t]
+            [x[k] + t.gradient[k] for x, t in zip(self._tangents, traces, strict=True) if t]
             for k in range(self.cell.dimension)
         ]
         columns = list(map(list, zip(*moved, strict=True)))
         area = sp.Matrix(self._crossed(columns)) / self._area
         if self.geometry == AXISYMMETRIC:
-            radius = self._place()[1]
+            radius = self._position()[1]
             area = area * (radius + u[1]) / radius
         return area
 
@@ -99,5 +99,5 @@ class BoundaryModel(NodalFields):
 
     def _volume(self) -> Any:
         if self.geometry == AXISYMMETRIC:
-            return self.define("area_of_ring", 2 * sp.pi * self._place()[1] * self._area)
+            return self.define("area_of_ring", 2 * sp.pi * self._position()[1] * self._area)
         return self._area

@@ -27,8 +27,8 @@ class CellModel(NodalFields):
         self, name: str, cell: Element, geometry: str, rule: QuadratureRule, doc: str
     ) -> None:
         super().__init__(name, cell, geometry, rule, doc, dimension=cell.dimension)
-        slopes = self._parent(self.order)[1]
-        self._map = kinematics.isoparametric(self, self._X, slopes, "parent_")
+        gradients = self._parent(self.order)[1]
+        self._map = kinematics.isoparametric(self, self._X, gradients, "parent_")
         self._centroids = 0
         self._slopes_by_order = {self.order: self._map.dN}
 
@@ -46,10 +46,10 @@ class CellModel(NodalFields):
         """Value of a scalar, list or matrix at the centroid of the parent cell."""
         linear = self._element(1) if self.order > 1 else self.cell
         middle = [sum(x) / sp.Integer(len(linear.nodes)) for x in zip(*linear.nodes, strict=True)]
-        there = dict(zip(self._at, middle, strict=True))
+        at_centroid = dict(zip(self._at, middle, strict=True))
         self._centroids += 1
         label, entries = f"centroid_{self._centroids}", Entries.of(value)
-        moved = [sp.sympify(v).xreplace(there) for v in entries.values]
+        moved = [sp.sympify(v).xreplace(at_centroid) for v in entries.values]
         named = [
             self.define(label + suffix, v)
             for suffix, v in zip(entries.suffixes, moved, strict=True)
@@ -75,5 +75,5 @@ class CellModel(NodalFields):
 
     def _volume(self) -> Any:
         if self.geometry == AXISYMMETRIC:
-            return self.define("volume_of_ring", 2 * sp.pi * self._place()[1] * self._map.detJ)
+            return self.define("volume_of_ring", 2 * sp.pi * self._position()[1] * self._map.detJ)
         return self._map.detJ

@@ -33,13 +33,13 @@ class Component:
     """A scalar that varies in the cell.
 
     name: as of its unknowns; of what was at the step before name_old, of a rate name_rate, of an
-    acceleration name_acceleration. order: of its shape functions. given: whether it is data, not an
-    unknown.
+    acceleration name_acceleration. order: of its shape functions. is_data: whether it is data, not
+    an unknown.
     """
 
     name: str
     order: int
-    given: bool = False
+    is_data: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class PointForm:
     centroid: Mapping[int, Node] = field(default_factory=dict)
 
     @property
-    def own(self) -> dict[int, Quantity]:
+    def cell_quantities(self) -> dict[int, Quantity]:
         """The unknowns that are fields at this point, with their numbers in `unknowns`."""
         others = {self.all[k] for k in self.centroid}
         return {k: q for k, q in enumerate(self.unknowns) if q not in others}
@@ -158,7 +158,7 @@ class Definition:
     graph: Graph
     potential: Node
     constant: tuple[Node, ...]
-    given: Mapping[Node, Mapping[Node, Node]]
+    prescribed: Mapping[Node, Mapping[Node, Node]]
     directions: tuple[Node, ...]
     interface: tuple[Node, ...]
     fields: tuple[tuple[str, Node], ...]
@@ -173,7 +173,7 @@ class Definition:
     """Basis values of the interpolated field: value and derivative, on each side of a facet."""
     nodal: tuple[tuple[int, int], ...] = ()
     """First unknown and number of components of every field with unknowns at all nodes."""
-    places: tuple[tuple[str, int | None], ...] = ()
+    dof_nodes: tuple[tuple[str, int | None], ...] = ()
     """Of every unknown its name without number, and its node or None."""
     history: tuple[str, ...] = ()
     """Point data that the last fields are the new values of."""
@@ -190,9 +190,9 @@ class Definition:
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        shown = self.unknowns if len(self.unknowns) <= 6 else self.unknowns[:5]
+        unknowns = self.unknowns if len(self.unknowns) <= 6 else self.unknowns[:5]
         more = f", ... ({len(self.unknowns)})" if len(self.unknowns) > 6 else ""
-        names = ", ".join(shown) or "none"
+        names = ", ".join(unknowns) or "none"
         return f"<Definition {self.name}: {self.nodes} nodes; unknowns: {names}{more}>"
 
     @property
@@ -203,7 +203,7 @@ class Definition:
     @property
     def conservative(self) -> bool:
         """True if the residual is the gradient of the potential."""
-        return not self.constant and not self.given
+        return not self.constant and not self.prescribed
 
     def for_derivatives(self) -> Definition:
         """Return the model from which derivatives of results are computed, along any variation.

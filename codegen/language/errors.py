@@ -30,8 +30,8 @@ def page_line() -> str:
     frame: FrameType | None = sys._getframe(1)
     while frame is not None:
         path = Path(frame.f_code.co_filename).resolve()
-        ours = path.is_relative_to(_CODEGEN) and not path.is_relative_to(_CODEGEN / "models")
-        if not ours and "sympy" not in path.parts and not path.name.startswith("<"):
+        internal = path.is_relative_to(_CODEGEN) and not path.is_relative_to(_CODEGEN / "models")
+        if not internal and "sympy" not in path.parts and not path.name.startswith("<"):
             return f"{path}:{frame.f_lineno}"
         frame = frame.f_back
     return ""

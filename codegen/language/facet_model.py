@@ -79,19 +79,19 @@ class FacetModel(NodalFields):
 
     def jump(self, value: Any) -> Any:
         """A value in the first cell less that in the second; on a side of the mesh the value."""
-        here = Entries.of(value)
+        entries = Entries.of(value)
         if self._count == 1:
             return value
-        pairs = zip(here.values, self._beyond(here), strict=True)
-        return here.arrange([a - b for a, b in pairs])
+        pairs = zip(entries.values, self._beyond(entries), strict=True)
+        return entries.arrange([a - b for a, b in pairs])
 
     def average(self, value: Any) -> Any:
         """Mean of a value in both cells; on a side of the mesh the value."""
-        here = Entries.of(value)
+        entries = Entries.of(value)
         if self._count == 1:
             return value
-        pairs = zip(here.values, self._beyond(here), strict=True)
-        return here.arrange([(a + b) / 2 for a, b in pairs])
+        pairs = zip(entries.values, self._beyond(entries), strict=True)
+        return entries.arrange([(a + b) / 2 for a, b in pairs])
 
     def finish(self) -> Definition:
         """The frozen definition.  Raises Elsewhere where nothing is said of the second cell."""
@@ -99,10 +99,10 @@ class FacetModel(NodalFields):
             raise Elsewhere(f"{self.name}: a page on facets between cells has m.jump or m.average")
         return super().finish()
 
-    def _beyond(self, here: Entries) -> list[Any]:
+    def _beyond(self, entries: Entries) -> list[Any]:
         """Values of the first cell as they are in the second."""
         self._crossed = True
-        return [sp.sympify(v).xreplace(self._others) for v in here.values]
+        return [sp.sympify(v).xreplace(self._others) for v in entries.values]
 
     def _at_facet(self, second: int) -> list[Any]:
         """Parent place in a cell of the point of the facet."""
@@ -110,25 +110,25 @@ class FacetModel(NodalFields):
         corners, face = FIRST[shape], ELEMENTS[FACES[shape]]
         N, count = face.shape(*self._at), len(corners)
         turn = [(1 - k) % count if second else k for k in range(count)]
-        places = [self.cell.nodes[corners[k]] for k in turn]
+        points = [self.cell.nodes[corners[k]] for k in turn]
         axes = range(self.cell.dimension)
-        return [sp.expand(sum(n * p[i] for n, p in zip(N, places, strict=True))) for i in axes]
+        return [sp.expand(sum(n * p[i] for n, p in zip(N, points, strict=True))) for i in axes]
 
     def _seen(self, second: int) -> tuple[list[Any], Any, Any]:
         """Shape functions, their gradients and the Jacobian determinant of one cell."""
         label, size = "ab"[second], self.dimension
-        place, own = self._at_facet(second), self._own(second)
-        N = [self.define(f"shape_{label}_{a}", v) for a, v in enumerate(self.cell.shape(*place))]
+        point, nodes = self._at_facet(second), self._nodes_of(second)
+        N = [self.define(f"shape_{label}_{a}", v) for a, v in enumerate(self.cell.shape(*point))]
         xi = sp.symbols(f"xi:{size}", real=True)
-        there = dict(zip(xi, place, strict=True))
+        at_point = dict(zip(xi, point, strict=True))
         parent = [
-            [sp.sympify(g).subs(there, simultaneous=True) for g in row]
+            [sp.sympify(g).subs(at_point, simultaneous=True) for g in row]
             for row in self.cell.gradient(*xi)
         ]
         J = sp.Matrix(
             size,
             size,
-            lambda i, k: interpolate([g[k] for g in parent], [self._X[i][a] for a in own]),
+            lambda i, k: interpolate([g[k] for g in parent], [self._X[i][a] for a in nodes]),
         )
         J = self.define(f"dX_{label}", J)
         det = self.define(f"detJ_{label}", J.det(method="berkowitz"))
@@ -139,11 +139,11 @@ class FacetModel(NodalFields):
             for a, row in enumerate(rows)
         ]
         if not second:
-            along = [[sp.diff(p, s) for s in self._at] for p in place]
+            along = [[sp.diff(p, s) for s in self._at] for p in point]
             self._tangents = J * sp.Matrix(along)
         return N, dN, det
 
-    def _own(self, second: int) -> range:
+    def _nodes_of(self, second: int) -> range:
         count = len(self.cell.nodes)
         return range(second * count, (second + 1) * count)
 
@@ -161,33 +161,33 @@ class FacetModel(NodalFields):
                 f"{components[0].name}: on facets fields have the order of the cell, {self.order}"
             )
         names = [c.name for c in components]
-        given = components[0].given
-        columns: Any = self.nodal_data(*names) if given else self.nodal_unknowns(*names)
+        is_data = components[0].is_data
+        columns: Any = self.nodal_data(*names) if is_data else self.nodal_unknowns(*names)
         traced = []
         for component, column in zip(components, columns, strict=True):
-            found = []
+            values = []
             for second in range(self._count):
                 N, dN, _ = self._sides[second]
                 label = component.name + ("_beyond" if second else "")
-                own = [column[a] for a in self._own(second)]
-                value = self.define(label, interpolate(N, own))
-                rows = [interpolate([g[k] for g in dN], own) for k in range(self.dimension)]
-                slopes = [self.define(f"grad_{label}_{k}", v) for k, v in enumerate(rows)]
-                found.append((value, *slopes))
-            self._others.update(zip(found[0], found[-1], strict=True))
-            traced.append(Traced(component, found[0][0], tuple(found[0][1:])))
+                nodal = [column[a] for a in self._nodes_of(second)]
+                value = self.define(label, interpolate(N, nodal))
+                rows = [interpolate([g[k] for g in dN], nodal) for k in range(self.dimension)]
+                gradient = [self.define(f"grad_{label}_{k}", v) for k, v in enumerate(rows)]
+                values.append((value, *gradient))
+            self._others.update(zip(values[0], values[-1], strict=True))
+            traced.append(Traced(component, values[0][0], tuple(values[0][1:])))
         return traced
 
     def _slopes_of(self, component: Component, column: Sequence[Any]) -> list[Any]:
         raise AssertionError("the traces of a facet have slopes of their own")
 
-    def _place(self) -> list[Any]:
+    def _position(self) -> list[Any]:
         N = self._sides[0][0]
         names = (f"at_{axis}" for axis in "XYZ")
-        own = [[x[a] for a in self._own(0)] for x in self._X]
-        return [self.define(n, interpolate(N, x)) for n, x in zip(names, own, strict=False)]
+        nodal = [[x[a] for a in self._nodes_of(0)] for x in self._X]
+        return [self.define(n, interpolate(N, x)) for n, x in zip(names, nodal, strict=False)]
 
     def _volume(self) -> Any:
         if self.geometry == AXISYMMETRIC:
-            return self.define("area_of_ring", 2 * sp.pi * self._place()[1] * self._area)
+            return self.define("area_of_ring", 2 * sp.pi * self._position()[1] * self._area)
         return self._area

@@ -37,7 +37,7 @@ class Traced:
 
     component: Component
     value: Any
-    slopes: tuple[Any, ...]
+    gradient: tuple[Any, ...]
 
 
 class Fields(Model):
@@ -75,7 +75,7 @@ class Fields(Model):
         """Unknowns at nodes of one field, or data; all of one order."""
 
     @abstractmethod
-    def _place(self) -> list[Any]:
+    def _position(self) -> list[Any]:
         """Reference coordinates of the point."""
 
     @abstractmethod
@@ -110,7 +110,7 @@ class Fields(Model):
             The cell does not allow the order.
         """
         names = [f"{name}_{axis}" for axis in AXES[: self.dimension]]
-        return Matrix(self._declared_fields(names, order, given=False))
+        return Matrix(self._declared_fields(names, order, is_data=False))
 
     def scalar(self, name: str, *, order: int | None = None) -> Any:
         """Declare a scalar field.
@@ -132,11 +132,11 @@ class Fields(Model):
         ModelError
             The cell does not allow the order.
         """
-        return self._declared_fields([name], order, given=False)[0]
+        return self._declared_fields([name], order, is_data=False)[0]
 
     def _internal_unknowns(self, names: Sequence[str]) -> list[sp.Symbol]:
         self._arguments.internal += names
-        return self._declared_fields(names, 0, given=False)
+        return self._declared_fields(names, 0, is_data=False)
 
     @property
     def parent(self) -> Any:
@@ -251,9 +251,9 @@ class Fields(Model):
             It is no field, or has order 0.
         """
         coefficient, suffix = self._arguments.of_time(order)
-        rest = Entries.of(self._of_step(field, suffix)).values
+        entries = Entries.of(self._of_step(field, suffix)).values
         now = Entries.of(field)
-        return now.arrange([coefficient * a + b for a, b in zip(now.values, rest, strict=True)])
+        return now.arrange([coefficient * a + b for a, b in zip(now.values, entries, strict=True)])
 
     def grad(self, value: Any) -> Any:
         """Return the gradient by the reference coordinates.
@@ -273,7 +273,7 @@ class Fields(Model):
         ModelError
             The expression has other symbols.
         """
-        rows = [self._slopes(v) for v in Entries.of(value).values]
+        rows = [self._gradient(v) for v in Entries.of(value).values]
         if isinstance(value, sp.MatrixBase):
             return Matrix(rows)
         return Matrix(rows[0])
@@ -306,7 +306,7 @@ class Fields(Model):
     @property
     def position(self) -> Any:
         """Reference coordinates of the point, (dimension, 1); in axisymmetry axis and radius."""
-        return Matrix(self._place())
+        return Matrix(self._position())
 
     def deformation_gradient(self, u: Any, name: str = "F") -> Any:
         """Return F = 1 + Grad u, (3, 3), with named entries F_00, F_01, ...
@@ -332,13 +332,13 @@ class Fields(Model):
         size = self.dimension
         if getattr(u, "shape", None) != (size, 1):
             raise ModelError(f"deformation_gradient: a vector of {size} is needed, as of m.vector")
-        slopes = self.grad(u)
+        gradient = self.grad(u)
         F = sp.eye(3)
         for i in range(size):
             for k in range(size):
-                F[i, k] += slopes[i, k]
+                F[i, k] += gradient[i, k]
         if self.geometry == AXISYMMETRIC:
-            F[2, 2] += u[1] / self._place()[1]
+            F[2, 2] += u[1] / self._position()[1]
         named = [[F[i, k] for k in range(3)] for i in range(3)]
         for i in range(3):
             for k in range(3):
@@ -459,50 +459,50 @@ class Fields(Model):
 
     # --------------------------------------------------------------------------------------------
 
-    def _declared_fields(self, names: Sequence[str], order: int | None, given: bool) -> list[Any]:
-        chosen = self.order if order is None else order
-        if chosen not in (0, 1, self.order):
+    def _declared_fields(self, names: Sequence[str], order: int | None, is_data: bool) -> list[Any]:
+        field_order = self.order if order is None else order
+        if field_order not in (0, 1, self.order):
             allowed = "0 or 1" if self.order == 1 else f"0, 1 or {self.order}"
             raise ModelError(
                 f"{names[0]}: order = {order!r} on {self.cell.name}; allowed is {allowed}"
             )
-        traced = self._components_of([Component(name, chosen, given) for name in names])
+        traced = self._components_of([Component(name, field_order, is_data) for name in names])
         self._traced.update({t.value: t for t in traced})
         return [t.value for t in traced]
 
     def _of_step(self, field: Any, suffix: str) -> Any:
         """Data of a field that a study fills at every step."""
         entries = Entries.of(field)
-        found = []
+        data = []
         for value in entries.values:
             traced = self._traced.get(value)
-            if traced is None or traced.component.given:
+            if traced is None or traced.component.is_data:
                 raise ModelError(f"{value} is no field: give what m.vector or m.scalar returned")
             component = traced.component
             if not component.order:
                 raise ModelError(f"{value} has order 0: steps before are known at nodes only")
             name = f"{component.name}_{suffix}"
-            known = [t.value for t in self._traced.values() if t.component.name == name]
-            found += known or self._declared_fields([name], component.order, given=True)
-        return entries.arrange(found)
+            existing = [t.value for t in self._traced.values() if t.component.name == name]
+            data += existing or self._declared_fields([name], component.order, is_data=True)
+        return entries.arrange(data)
 
-    def _slopes(self, value: Any) -> list[Any]:
+    def _gradient(self, value: Any) -> list[Any]:
         """Slopes of an expression of fields along the axes, names of m.define included."""
         expression = sp.sympify(value)
         met = expression.free_symbols
         fields = [t for v, t in self._traced.items() if v in met or expression.has(v)]
-        known = {s for t in fields for s in (t.value, *_leaves(t.value))}
-        known |= {sp.Symbol(n, real=True) for n in self._arguments.names("parameters")}
-        strange = sorted(str(s) for s in _leaves(expression) - known)
-        if strange or not fields:
+        allowed = {s for t in fields for s in (t.value, *_leaves(t.value))}
+        allowed |= {sp.Symbol(n, real=True) for n in self._arguments.names("parameters")}
+        unknown = sorted(str(s) for s in _leaves(expression) - allowed)
+        if unknown or not fields:
             raise ModelError(
-                f"grad of {value}: {strange[0] if strange else 'it'} is no field; gradients are "
+                f"grad of {value}: {unknown[0] if unknown else 'it'} is no field; gradients are "
                 "those of fields, and of expressions of fields and parameters"
             )
-        slopes = []
+        gradient = []
         for k in range(self.dimension):
-            slopes.append(sp.Add(*(expression.diff(t.value) * t.slopes[k] for t in fields)))
-        return slopes
+            gradient.append(sp.Add(*(expression.diff(t.value) * t.gradient[k] for t in fields)))
+        return gradient
 
 
 def _leaves(expression: Any) -> set[Any]:
@@ -516,4 +516,4 @@ def order_of(cell: Element) -> int:
     corners = {1: (2,), 2: (3, 4), 3: (4, 6, 8)}[cell.dimension]
     if len(cell.nodes) in corners:
         return 1
-    return max(2, len({place[0] for place in cell.nodes}) - 1)
+    return max(2, len({node[0] for node in cell.nodes}) - 1)

@@ -73,11 +73,11 @@ def isoparametric(m: Model, X: Any, parent: Any, label: str = "") -> Isoparametr
     inverse = m.define(f"{label}dX_inverse", J.adjugate() / detJ)
     m.measure(detJ, inverse)
     dN = [list(sp.Matrix([list(g)]) * inverse) for g in parent]
-    slopes = [
+    gradients = [
         [m.define(f"{label}dN_{a}{k}", v) for k, v in enumerate(row)] for a, row in enumerate(dN)
     ]
     rows = (
-        Listed(row, f"dN[{a}], the gradient of a shape function") for a, row in enumerate(slopes)
+        Listed(row, f"dN[{a}], the gradient of a shape function") for a, row in enumerate(gradients)
     )
     return Isoparametric(Listed(rows, "dN, one row for each node"), detJ, inverse, J)
 
@@ -91,14 +91,14 @@ def _require_parent(m: Model, size: int, parent: Any) -> None:
             f"{', '.join(map(str, sorted(widths)))} coordinates, but {m.name} has {m.nodes} nodes "
             f"and {size} coordinates"
         )
-    known = cells.of(m.nodes, m.rule.dimension)
-    if known is None or known.cell.fits(m.rule):
+    match = cells.of(m.nodes, m.rule.dimension)
+    if match is None or match.cell.fits(m.rule):
         return
-    places = {s: sp.Rational(1, 7 + 2 * k) for k, s in enumerate(m.point())}
-    found = [sp.sympify(g).subs(places) for row in parent for g in row]
-    if found == [g for row in known.gradient(*places.values()) for g in row]:
+    sample = {s: sp.Rational(1, 7 + 2 * k) for k, s in enumerate(m.point())}
+    values = [sp.sympify(g).subs(sample) for row in parent for g in row]
+    if values == [g for row in match.gradient(*sample.values()) for g in row]:
         raise ModelError(
-            f"{m.name} has shape functions of {known.name}, but {cells.misfit(known.cell)}"
+            f"{m.name} has shape functions of {match.name}, but {cells.misfit(match.cell)}"
         )
 
 

@@ -57,22 +57,22 @@ def implicit(
     """
     begin, unknowns = Entries.of(start), Entries.of(start).map(lambda _: sp.Dummy(real=True))
     local = symbols.placeholders(name, unknowns)
-    found = Entries.of(applied(name, equations, unknowns.shaped()))
-    if len(found.values) != len(local):
+    residuals = Entries.of(applied(name, equations, unknowns.shaped()))
+    if len(residuals.values) != len(local):
         raise ModelError(
-            f"{name}: {len(found.values)} equations for {len(local)} unknowns; one for each"
+            f"{name}: {len(residuals.values)} equations for {len(local)} unknowns; one for each"
         )
-    values = condensed([symbols.lower(e) for e in found.values], local)
+    values = condensed([symbols.lower(e) for e in residuals.values], local)
     system = localise(symbols.graph, values, local)
     routine = newton(symbols.graph, name, system, iteration.control(name))
     for k in range(len(local)):
         if all(row[k] is symbols.graph.zero for row in routine.by_local):
             raise ModelError(f"{name}: unknown {k} does not occur in the equations")
     args = [*system.external, *(symbols.lower(e) for e in begin.values)]
-    below = [*found.values, *begin.values]
+    below = [*residuals.values, *begin.values]
     solution = symbols.named(name, begin, symbols.graph.run(routine, args), below)
     symbols.record.implicit(
-        found.values, unknowns.values, begin.values, Entries.of(solution).values
+        residuals.values, unknowns.values, begin.values, Entries.of(solution).values
     )
     return solution
 
@@ -87,12 +87,12 @@ def written_out(
     name: str,
     values: list[Node],
     unknowns: Sequence[Node],
-    given: Collection[Node],
+    prescribed: Collection[Node],
     rule: QuadratureRule,
 ) -> list[Node]:
     """Equations with integrals of the unknowns as sums of one term for each point.
 
-    given: values whose derivatives a page gives.
+    prescribed: values whose derivatives a page gives.
     """
     inside = depends(values, unknowns)
     if any(v.varying for v in values):
@@ -102,7 +102,7 @@ def written_out(
         )
     below = reachable([n for n in inside if n.op is Op.SUM])
     arrays = {n.payload.array for n in below if isinstance(n.payload, Input) and n.varying}
-    if arrays - {"rule"} or any(n in given for n in below):
+    if arrays - {"rule"} or any(n in prescribed for n in below):
         raise ModelError(
             f"{name}: an integral of local unknowns may hold no point data, no interpolated "
             "field and no given derivative; use m.unknown for what the element condenses"
@@ -132,7 +132,7 @@ def principal(
     args = [*entries, *system.external]
     node = symbols.graph.name(name, symbols.graph.run(routine, args)[0])
     symbol: sp.Symbol = symbols.record.principal(
-        symbols.name(name, node, [*C, written], known=False), written, squares.values, C
+        symbols.name(name, node, [*C, written], has_definition=False), written, squares.values, C
     )
     return symbol
 

@@ -306,8 +306,8 @@ class Law:
             m.minimise(W)
         J = m.define("volume_ratio", F.det(method="berkowitz"))
         cauchy = P if small else P * F.T / J
-        shown = _SHOWN.get(m.dimension, _SYMMETRIC)
-        m.fields(J=J, **{f"sigma_{AXES[i]}{AXES[k]}": cauchy[i, k] for i, k in shown})
+        entries = _SHOWN.get(m.dimension, _SYMMETRIC)
+        m.fields(J=J, **{f"sigma_{AXES[i]}{AXES[k]}": cauchy[i, k] for i, k in entries})
 
 
 def material(function: Callable[[Material], object]) -> Law:

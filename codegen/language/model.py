@@ -3,7 +3,7 @@
 A model page declares its arguments, writes its mathematics in SymPy, and ends with `potential` or
 `weak_form`.  Nothing is differentiated here; `codegen.pipeline` does that.
 
-`Model` is what a page may say; `draft.Draft` owns the parts that keep it.
+`Model` is what a page may say; `model_builder.ModelBuilder` owns the parts that hold it.
 """
 
 from __future__ import annotations

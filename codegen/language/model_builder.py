@@ -38,8 +38,8 @@ _TIMES = (
 class Arguments:
     """The arrays of one element: which names they hold, in which order, declared in which line.
 
-    places: of every unknown its name without number, and its node or None. nodal: first unknown and
-    number of components of what has unknowns at all nodes. components: basis values of what is
+    dof_nodes: of every unknown its name without number, and its node or None. nodal: first unknown
+    and number of components of what has unknowns at all nodes. components: basis values of what is
     `interpolated`. directions: nodes of all that the potential is differentiated by. lists:
     parameters, data and point data.
     """
@@ -48,7 +48,7 @@ class Arguments:
         self._symbols, self._nodes = symbols, nodes
         self.coordinates: tuple[str, ...] = ()
         self.unknowns: list[str] = []
-        self.places: list[tuple[str, int | None]] = []
+        self.dof_nodes: list[tuple[str, int | None]] = []
         self.nodal: list[tuple[int, int]] = []
         self.internal: list[str] = []
         self.interpolated: str | None = None
@@ -67,9 +67,12 @@ class Arguments:
         if self.coordinates not in ((), names):
             raise ModelError(f"the coordinates are {', '.join(self.coordinates)} already")
         self.coordinates, width = names, len(names)
-        places = range(self._nodes)
+        node_range = range(self._nodes)
         columns = [
-            [self._symbols.input(f"{name}{a + 1}", "coordinates", a * width + c) for a in places]
+            [
+                self._symbols.input(f"{name}{a + 1}", "coordinates", a * width + c)
+                for a in node_range
+            ]
             for c, name in enumerate(names)
         ]
         return _columns("the coordinates", names, columns)
@@ -87,7 +90,7 @@ class Arguments:
         for a in range(count):
             for c, name in enumerate(names):
                 columns[c].append(self.unknown(f"{name}{a + 1}"))
-                self.places[-1] = (name, a)
+                self.dof_nodes[-1] = (name, a)
                 if name in idle:
                     self._idle.add(name)
                     self._declared.pop(f"{name}{a + 1}", None)
@@ -99,13 +102,13 @@ class Arguments:
             raise ModelError(f"declare {name} before the interpolated {self.interpolated}")
         symbol = self._input(name, "dofs", len(self.unknowns))
         self.unknowns.append(name)
-        self.places.append((name, None))
+        self.dof_nodes.append((name, None))
         self.directions.append(self._symbols.bound[symbol])
         return symbol
 
     def interpolated_sides(self, names: Sequence[str]) -> list[tuple[sp.Symbol, sp.Symbol]]:
         """Value and xi-derivative of several fields that share the `modes` unknowns."""
-        before, symbols = self.components, []
+        previous, symbols = self.components, []
         labels = [label for name in names for label in (name, f"{name}_xi")]
         for name in names:
             if name in self._symbols:
@@ -113,9 +116,9 @@ class Arguments:
         self.interpolated = ", ".join([*filter(None, [self.interpolated]), *names])
         self.components += len(labels)
         xi = sp.Symbol("xi", real=True)
-        for k, label in enumerate(labels, start=before):
+        for k, label in enumerate(labels, start=previous):
             node = self._symbols.graph.input("interpolated", k, varying=True)
-            symbols.append(self._symbols.name(label, node, xi, known=False))
+            symbols.append(self._symbols.name(label, node, xi, has_definition=False))
         for p, p_xi in zip(symbols[::2], symbols[1::2], strict=True):
             p.slope(xi, p_xi)
         self.directions.extend(self._symbols.bound[s] for s in symbols)
@@ -139,8 +142,8 @@ class Arguments:
         """Data at all or the first nodes."""
         columns = []
         for name in names:
-            given = {f"{name}{a + 1}": f"{name} {meaning}" for a in range(nodes or self._nodes)}
-            columns.append(self.declare("data", given))
+            meanings = {f"{name}{a + 1}": f"{name} {meaning}" for a in range(nodes or self._nodes)}
+            columns.append(self.declare("data", meanings))
         return _columns("the data", names, columns)
 
     def rates(self, names: Sequence[str], order: int) -> list[list[sp.Expr]]:
@@ -148,15 +151,15 @@ class Arguments:
         coefficient, suffix = self.of_time(order)
         found = []
         for name in names:
-            count = sum(n == name and a is not None for n, a in self.places)
+            count = sum(n == name and a is not None for n, a in self.dof_nodes)
             if not count:
                 raise ModelError(f"rates: {name} is no unknown at the nodes")
             values = [sp.Symbol(f"{name}{a + 1}", real=True) for a in range(count)]
-            (rest,) = self.nodal_data([f"{name}_{suffix}"], "of the steps before", count)
+            (offset,) = self.nodal_data([f"{name}_{suffix}"], "of the steps before", count)
             if name in self._idle:
-                for unused in (str(coefficient), *map(str, rest)):
+                for unused in (str(coefficient), *map(str, offset)):
                     self._declared.pop(unused, None)
-            found.append([coefficient * u + v for u, v in zip(values, rest, strict=True)])
+            found.append([coefficient * u + v for u, v in zip(values, offset, strict=True)])
         return found
 
     def of_time(self, order: int) -> tuple[sp.Symbol, str]:
@@ -175,14 +178,14 @@ class Arguments:
 
     def require(self, conditions: Iterable[Any]) -> None:
         """Conditions on parameters and data, with the line of the page."""
-        known = self.names("parameters", "data")
+        declared = self.names("parameters", "data")
         for c in conditions:
             if isinstance(c, sp.core.relational.Relational) and c.lhs.is_number:
                 c = c.reversed
             fit = isinstance(
                 c, (sp.StrictLessThan, sp.LessThan, sp.StrictGreaterThan, sp.GreaterThan)
             )
-            if not fit or str(c.lhs) not in known or not c.rhs.is_number:
+            if not fit or str(c.lhs) not in declared or not c.rhs.is_number:
                 raise ModelError(
                     f"require {c}: compare one parameter or datum with a number, e.g. mu > 0"
                 )
@@ -264,7 +267,7 @@ class Equations:
             )
         node = symbols.graph.sum(symbols.lower(integrand * weight))
         symbol: sp.Symbol = symbols.record.define(
-            symbols.name(name, node, integrand, known=False), Integral(integrand)
+            symbols.name(name, node, integrand, has_definition=False), Integral(integrand)
         )
         return symbol
 
@@ -303,13 +306,13 @@ class Equations:
 class Intermediates:
     """Names for values. interface: those that derivatives are taken through.
 
-    given: derivatives that a page gives instead of the true ones.
+    prescribed: derivatives that a page gives instead of the true ones.
     """
 
     def __init__(self, symbols: Symbols) -> None:
         self._symbols = symbols
         self.interface: list[Node] = []
-        self.given: dict[Node, dict[Node, Node]] = {}
+        self.prescribed: dict[Node, dict[Node, Node]] = {}
         self._norms = 0
 
     def define(
@@ -335,9 +338,9 @@ class Intermediates:
         if interface:
             self.interface.append(node)
         if derivative is not None:
-            self.given[node] = {lower(s): lower(e) for s, e in derivative.items()}
+            self.prescribed[node] = {lower(s): lower(e) for s, e in derivative.items()}
         return symbols.record.define(
-            symbols.name(name, node, expression, given=derivative), sp.sympify(expression)
+            symbols.name(name, node, expression, prescribed=derivative), sp.sympify(expression)
         )
 
     def norm(self, values: Any) -> Any:
@@ -365,7 +368,9 @@ class Intermediates:
         local = root.varying and not all(s.varying for s in sources)
         if local and any(n.op is Op.SUM for n in reachable([root], stop=sources.__contains__)):
             raise ModelError(f"{name}: {value} depends on an integral; give it a name of its own")
-        slopes = gradient(self._symbols.graph, root, sources, given=self.given, flat=local)
+        slopes = gradient(
+            self._symbols.graph, root, sources, prescribed=self.prescribed, flat=local
+        )
         below = [value, *symbols.values]
         matrix = isinstance(by, sp.MatrixBase)
         times = [sources.count(s) if matrix else 1 for s in sources]
@@ -376,7 +381,7 @@ class Intermediates:
         ]
         derivatives = self._symbols.named(name, symbols, parts, below)
         named = Entries.of(derivatives).values
-        self._symbols.record.slopes(value, symbols.values, named, times)
+        self._symbols.record.derivatives(value, symbols.values, named, times)
         return derivatives
 
 
@@ -411,12 +416,12 @@ class Outputs:
             self._symbols.record.fields.append((name, value))
             self.fields.append((name, self._symbols.lower(value)))
 
-    def add_history(self, new: Mapping[str, Any], known: Sequence[str]) -> None:
-        """New values of some of the `known` point data."""
+    def add_history(self, new: Mapping[str, Any], declared: Sequence[str]) -> None:
+        """New values of some of the `declared` point data."""
         for name, value in new.items():
-            if name not in known:
+            if name not in declared:
                 raise ModelError(
-                    f"history: {name} is no point data; there are {', '.join(known) or 'none'}"
+                    f"history: {name} is no point data; there are {', '.join(declared) or 'none'}"
                 )
             if name in [n for n, _ in self.history]:
                 raise ModelError(f"history: {name} is given twice in model {self._symbols.model}")
@@ -425,10 +430,10 @@ class Outputs:
 
     def choose(self, tasks: Sequence[str] | None, *, product: bool) -> None:
         """Add tasks by name."""
-        known = [str(t) for t in Task if t not in (Task.PSEUDO_LOAD, Task.FIELDS_RATE)]
+        allowed = [str(t) for t in Task if t not in (Task.PSEUDO_LOAD, Task.FIELDS_RATE)]
         for t in tasks or ():
-            if t not in known:
-                raise ModelError(f"no task {t!r}; there are {', '.join(known)}")
+            if t not in allowed:
+                raise ModelError(f"no task {t!r}; there are {', '.join(allowed)}")
         if tasks is not None:
             self._tasks = (*(self._tasks or ()), *tasks)
         self.product |= product or Task.PRODUCT in (tasks or ())
@@ -445,16 +450,16 @@ class Outputs:
 
 def check(definition: Definition) -> None:
     """Check that a finished model has what its tasks need.  Raises ModelError where not."""
-    name, chosen = definition.name, definition.tasks or ()
-    if Task.ENERGY in chosen and not definition.conservative:
+    name, tasks = definition.name, definition.tasks or ()
+    if Task.ENERGY in tasks and not definition.conservative:
         raise ModelError(f"no energy for {name}: its residual is not the gradient of one")
-    if (definition.pseudo_load or definition.fields_rate) and definition.given:
+    if (definition.pseudo_load or definition.fields_rate) and definition.prescribed:
         raise ModelError(
             f"no pseudo_load or fields_rate for {name}: it gives derivatives of its own"
         )
     if definition.fields_rate and not definition.fields:
         raise ModelError(f"no fields_rate for {name}: it declares no fields")
-    if Task.FIELDS in chosen and not definition.fields:
+    if Task.FIELDS in tasks and not definition.fields:
         raise ModelError(f"no task fields for {name}: it declares none")
 
 
@@ -491,9 +496,9 @@ class ModelBuilder:
                 f"{name} has no rule: give rule=quadrature.gauss(2, 2), say, or "
                 "rule=quadrature.point_rule() where there is no integral"
             )
-        wrong = self._foreign(rule, nodes)
-        if wrong:
-            raise ModelError(f"{name} has {nodes} nodes, and {wrong}")
+        mismatch = self._foreign(rule, nodes)
+        if mismatch:
+            raise ModelError(f"{name} has {nodes} nodes, and {mismatch}")
         self.name, self.nodes, self.rule, self.unroll = name, nodes, rule, unroll
         self.doc = " ".join((doc or "").split())
         self._symbols = Symbols(name)
@@ -538,7 +543,7 @@ class ModelBuilder:
             graph=self.graph,
             potential=potential,
             constant=constant,
-            given=self._intermediates.given,
+            prescribed=self._intermediates.prescribed,
             directions=tuple(a.directions),
             interface=tuple(self._intermediates.interface),
             fields=o.evaluated,
@@ -551,7 +556,7 @@ class ModelBuilder:
             conditions=tuple(a.conditions),
             nodal=tuple(a.nodal),
             components=a.components or 2,
-            places=tuple(a.places),
+            dof_nodes=tuple(a.dof_nodes),
             history=tuple(name for name, _ in o.history),
             internal=tuple(a.internal),
             record=self._symbols.record,
@@ -561,10 +566,12 @@ class ModelBuilder:
 
     def _check_use(self, potential: Node) -> None:
         """Every unknown enters the potential, every other argument it or a field."""
-        given = [
-            n for pairs in self._intermediates.given.values() for n in (*pairs, *pairs.values())
+        prescribed = [
+            n
+            for pairs in self._intermediates.prescribed.values()
+            for n in (*pairs, *pairs.values())
         ]
-        equations = set(reachable([potential, *given]))
+        equations = set(reachable([potential, *prescribed]))
         used = equations | set(reachable([n for _, n in self._outputs.evaluated]))
         self._arguments.check_use(equations, used, self._unused)
 
@@ -574,7 +581,9 @@ class ModelBuilder:
             return values
         if self.unroll is False:
             raise ModelError(f"{name}: its equations are integrals, which need unroll=True or None")
-        given = self._intermediates.given
-        written = local_unknowns.written_out(self.graph, name, values, unknowns, given, self.rule)
+        prescribed = self._intermediates.prescribed
+        written = local_unknowns.written_out(
+            self.graph, name, values, unknowns, prescribed, self.rule
+        )
         self.unroll = True
         return written

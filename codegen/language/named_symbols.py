@@ -41,29 +41,35 @@ def written_out() -> Iterator[None]:
 
 
 def named(
-    label: str, value: Any, *, known: bool = True, given: Mapping[Any, Any] | None = None
+    label: str,
+    value: Any,
+    *,
+    has_definition: bool = True,
+    prescribed: Mapping[Any, Any] | None = None,
 ) -> Any:
-    """The name of `value`, an expression or several; not `known`: it only depends on them."""
+    """Return the name of `value`: one or several expressions. has_definition: False if it only
+    depends on them.
+    """
     values = [sp.sympify(v) for v in (value if isinstance(value, (list, tuple)) else [value])]
-    if known and _WRITTEN.get() and not given:
+    if has_definition and _WRITTEN.get() and not prescribed:
         return ExpandedName(label, values[0])
-    below = {s for v in values for s in _direct(v)} | set(given or ())
-    return Name(label, values[0] if known else None, below, given)
+    below = {s for v in values for s in _direct(v)} | set(prescribed or ())
+    return Name(label, values[0] if has_definition else None, below, prescribed)
 
 
 def _direct(value: Any) -> set[Any]:
     """Symbols and names of an expression, without those that its names stand for."""
     if not isinstance(value, sp.Basic):
         return set(value.free_symbols)
-    found, seen, waiting = set(), set(), [value]
+    names, seen, waiting = set(), set(), [value]
     while waiting:  # each part once: what is written out stands in many places
         e = waiting.pop()
         if e not in seen:
             seen.add(e)
             waiting += e.args
             if isinstance(e, sp.Symbol):
-                found.add(e)
-    return found
+                names.add(e)
+    return names
 
 
 def _refuse_truth(symbol: Any, other: object) -> None:
@@ -86,10 +92,10 @@ class Name(sp.Symbol):  # type: ignore[misc]
     """A symbol with a definition; two are equal only if they are one and the same."""
 
     definition: Any
-    given: Mapping[Any, Any] | None
+    prescribed: Mapping[Any, Any] | None
     below: set[Any]
     number: int
-    _slopes: dict[Any, Any]
+    _derivatives: dict[Any, Any]
     _values: dict[Any, Any]
 
     def __new__(
@@ -97,12 +103,12 @@ class Name(sp.Symbol):  # type: ignore[misc]
         label: str,
         definition: Any,
         below: Iterable[Any],
-        given: Mapping[Any, Any] | None = None,
+        prescribed: Mapping[Any, Any] | None = None,
     ) -> Name:
         self: Name = sp.Symbol.__xnew__(cls, label, real=True)
-        self.definition, self.given = definition, given
+        self.definition, self.prescribed = definition, prescribed
         self.below, self.number = set(below), next(_NUMBERS)
-        self._slopes, self._values = {}, {}
+        self._derivatives, self._values = {}, {}
         return self
 
     def __eq__(self, other: object) -> bool:
@@ -118,18 +124,18 @@ class Name(sp.Symbol):  # type: ignore[misc]
     @property
     def free_symbols(self) -> set[Any]:
         """The name itself and all that it depends on."""
-        found: set[Any] = {self}
+        symbols: set[Any] = {self}
         waiting = [self]
         while waiting:
-            for s in waiting.pop().below - found:
-                found.add(s)
+            for s in waiting.pop().below - symbols:
+                symbols.add(s)
                 if isinstance(s, Name):
                     waiting.append(s)
-        return found
+        return symbols
 
     def slope(self, s: Any, value: Any) -> None:
         """Declare the derivative by a symbol of what has no definition."""
-        self._slopes[s] = value
+        self._derivatives[s] = value
 
     def _above(self, sources: set[Any]) -> list[Name]:
         """Names that depend on `sources`, of this one and those below it, lowest first.
@@ -138,12 +144,12 @@ class Name(sp.Symbol):  # type: ignore[misc]
         """
         names = [n for n in self.free_symbols if isinstance(n, Name) and n not in sources]
         reached = set(sources)
-        found = []
+        users = []
         for n in sorted(names, key=lambda n: n.number):
             if n.below & reached:
                 reached.add(n)
-                found.append(n)
-        return found if self in reached else []
+                users.append(n)
+        return users if self in reached else []
 
     def _refusal(self, what: str, remedy: str) -> UnseenError:
         return UnseenError(f"{what} {self}, a name through which SymPy does not see: {remedy}")
@@ -151,18 +157,18 @@ class Name(sp.Symbol):  # type: ignore[misc]
     def _eval_derivative(self, s: Any) -> Any:
         if self is s:
             return sp.Integer(1)
-        if s not in self._slopes:
+        if s not in self._derivatives:
             for n in self._above({s}):
-                if s not in n._slopes:
-                    n._slopes[s] = n._slope(s)
-        return self._slopes.get(s, sp.Integer(0))
+                if s not in n._derivatives:
+                    n._derivatives[s] = n._slope(s)
+        return self._derivatives.get(s, sp.Integer(0))
 
     def _eval_derivative_n_times(self, s: Any, n: Any) -> Any:
         return sp.Basic._eval_derivative_n_times(self, s, n)  # not that of an atom
 
     def _slope(self, s: Any) -> Any:
-        if self.given is not None:
-            return sp.Add(*(d * sp.sympify(x).diff(s) for x, d in self.given.items()))
+        if self.prescribed is not None:
+            return sp.Add(*(d * sp.sympify(x).diff(s) for x, d in self.prescribed.items()))
         if self.definition is None:
             raise self._refusal(
                 f"SymPy's derivative by {s} meets", f"use m.derivative(name, value, {s})"
@@ -179,7 +185,7 @@ class Name(sp.Symbol):  # type: ignore[misc]
         return self._values.get(key)
 
     def _definition(self, old: Any) -> Any:
-        if self.definition is None or self.given is not None:
+        if self.definition is None or self.prescribed is not None:
             raise self._refusal(f"{old} is replaced in", "replace it before this is named")
         return self.definition
 
@@ -188,11 +194,11 @@ class Name(sp.Symbol):  # type: ignore[misc]
             return rule[self], True
         if not isinstance(rule, dict):
             return self, False
-        known = dict(rule)
+        rules = dict(rule)
         for n in self._above({s for old in rule for s in _direct(old)}):
-            value = n._definition(", ".join(map(str, rule)))._xreplace(known)[0]
-            known[n] = n if value == n.definition else value
-        value = known.get(self, self)
+            value = n._definition(", ".join(map(str, rule)))._xreplace(rules)[0]
+            rules[n] = n if value == n.definition else value
+        value = rules.get(self, self)
         return value, value is not self
 
     def xreplace(self, rule: Any, hack2: bool = False) -> Any:
@@ -215,7 +221,7 @@ def _undecided(question: Callable[..., Any]) -> Callable[..., Any]:
     """A question of SymPy's simplification, with the answer None where it cannot be answered."""
 
     @wraps(question)
-    def answer(*args: Any, **kwargs: Any) -> Any:
+    def compare(*args: Any, **kwargs: Any) -> Any:
         try:
             return question(*args, **kwargs)
         except UnseenError:
@@ -225,7 +231,7 @@ def _undecided(question: Callable[..., Any]) -> Callable[..., Any]:
                 raise
             return None
 
-    return answer
+    return compare
 
 
 # To fold branches in conditions, SymPy asks by substitution and derivatives whether both sides of a
@@ -244,12 +250,12 @@ class ExpandedName(sp.Expr):  # type: ignore[misc]
     is_commutative = True
     is_extended_real = is_real = True
     _diff_wrt = True
-    _slopes: dict[Any, Any]
+    _derivatives: dict[Any, Any]
     _free: set[Any] | None
 
     def __new__(cls, label: Any, definition: Any) -> ExpandedName:
         self: ExpandedName = sp.Expr.__new__(cls, Str(str(label)), definition)
-        self._slopes, self._free = {}, None
+        self._derivatives, self._free = {}, None
         return self
 
     @property
@@ -274,9 +280,9 @@ class ExpandedName(sp.Expr):  # type: ignore[misc]
         return self
 
     def _eval_derivative(self, s: Any) -> Any:
-        if s not in self._slopes:
-            self._slopes[s] = self.definition.diff(s)
-        return self._slopes[s]
+        if s not in self._derivatives:
+            self._derivatives[s] = self.definition.diff(s)
+        return self._derivatives[s]
 
     def _sympystr(self, _: Any) -> str:
         return str(self.args[0])

@@ -91,22 +91,22 @@ class NodalFields(Fields):
                 dN = [sp.diff(v, x) for v in N]
                 label = f"along_{'xyz'[k]}"
                 values = [self.define(f"{label}_{a}", v) for a, v in enumerate(N)]
-                slopes = [self.define(f"{label}_slope_{a}", v) for a, v in enumerate(dN)]
-                along.append((values, slopes))
+                gradients = [self.define(f"{label}_slope_{a}", v) for a, v in enumerate(dN)]
+                along.append((values, gradients))
         axes = range(cell.dimension)
 
-        def product(place: tuple[int, ...], by: int | None) -> Any:
-            return sp.Mul(*(along[k][k == by][place[k]] for k in axes))
+        def product(node: tuple[int, ...], by: int | None) -> Any:
+            return sp.Mul(*(along[k][k == by][node[k]] for k in axes))
 
-        values = [product(place, None) for place in cell.lines]
-        return values, [tuple(product(place, by) for by in axes) for place in cell.lines]
+        values = [product(node, None) for node in cell.lines]
+        return values, [tuple(product(node, by) for by in axes) for node in cell.lines]
 
     def _components_of(self, components: Sequence[Component]) -> list[Traced]:
         N = self._shape(components[0].order)
         names = [c.name for c in components]
         if not components[0].order:
             columns: Any = [[self.unknown(name)] for name in names]
-        elif components[0].given:
+        elif components[0].is_data:
             columns = self.nodal_data(*names, nodes=len(N))
         else:
             columns = self.nodal_unknowns(*names, nodes=len(N))
@@ -115,12 +115,12 @@ class NodalFields(Fields):
             name = component.name
             value = column[0] if not component.order else self.define(name, interpolate(N, column))
             zero = [sp.Integer(0)] * self.dimension
-            slopes = self._slopes_of(component, column) if component.order else zero
-            named = tuple(self.define(f"grad_{name}_{k}", v) for k, v in enumerate(slopes))
+            gradient = self._slopes_of(component, column) if component.order else zero
+            named = tuple(self.define(f"grad_{name}_{k}", v) for k, v in enumerate(gradient))
             traced.append(Traced(component, value, named))
         return traced
 
-    def _place(self) -> list[Any]:
+    def _position(self) -> list[Any]:
         N = self._shape(self.order)
         names = (f"at_{axis}" for axis in "XYZ")
         return [self.define(n, interpolate(N, x)) for n, x in zip(names, self._X, strict=False)]

@@ -39,7 +39,9 @@ class PointModel(Fields):
         directions = tuple(n for n in d.directions if n in used)
         unknowns = tuple(self._quantities[_index(n)] for n in directions)
         others = [n for n in directions if _index(n) in self._centroid]
-        varied = gradient(d.graph, d.potential, others, constant=d.constant, given=d.given)
+        varied = gradient(
+            d.graph, d.potential, others, constant=d.constant, prescribed=d.prescribed
+        )
         if any(varied[n] is not d.graph.zero for n in others):
             raise NeedsElement("m.centroid of what is varied")
         d = replace(d, directions=directions)
@@ -59,11 +61,11 @@ class PointModel(Fields):
             node = self._symbols.lower(v)
             met = reachable([node])
             inputs = [n.payload for n in met if isinstance(n.payload, Input)]
-            known = all(
+            allowed = all(
                 i.array == "coordinates" or (i.array == "dofs" and i.index not in self._centroid)
                 for i in inputs
             )
-            if not known or any(n.op is Op.CALL for n in met):
+            if not allowed or any(n.op is Op.CALL for n in met):
                 raise NeedsElement(f"m.centroid({value})")
             label = f"centroid_{len(self._centroid)}"
             self._centroid[len(self._quantities)] = node
@@ -78,18 +80,18 @@ class PointModel(Fields):
                 component.name,
                 *(f"grad_{component.name}_{k}" for k in range(self.dimension)),
             ]
-            found = [Quantity(component, k) for k in (None, *range(self.dimension))]
-            if component.given:
+            quantities = [Quantity(component, k) for k in (None, *range(self.dimension))]
+            if component.is_data:
                 start = len(self._arguments.lists["data"])
                 symbols = self.data(**dict.fromkeys(labels, "at the point"))
-                self._given_at_point.update(enumerate(found, start))
+                self._given_at_point.update(enumerate(quantities, start))
             else:
                 symbols = [self.unknown(label) for label in labels]
-                self._quantities += found
+                self._quantities += quantities
             traced.append(Traced(component, symbols[0], tuple(symbols[1:])))
         return traced
 
-    def _place(self) -> list[Any]:
+    def _position(self) -> list[Any]:
         return self._X
 
     def _volume(self) -> Any:

@@ -99,10 +99,10 @@ class Lowering:
             e = sp.sympify(expression)
         except (sp.SympifyError, TypeError, ValueError):
             raise ModelError(f"{expression!r} is no mathematical expression") from None
-        found = self._memo.get(e)
-        if found is None:
-            found = self._memo[e] = yield self._convert(e)
-        return found
+        existing = self._memo.get(e)
+        if existing is None:
+            existing = self._memo[e] = yield self._convert(e)
+        return existing
 
     def _convert(self, e: Any) -> Recursion[Node]:
         if isinstance(e, sp.Symbol):
@@ -206,15 +206,17 @@ class Lowering:
             )
         return (yield self._piecewise(list(e.args), e))
 
-    def _piecewise(self, pairs: list[Any], whole: Any) -> Recursion[Node]:
+    def _piecewise(self, pairs: list[Any], expression: Any) -> Recursion[Node]:
         value, condition = pairs[0].args
         if condition is sp.true:
             return (yield self._side(value))
         if len(pairs) == 1:
-            raise ModelError(f"a branch without a last condition: {whole}; end it with (.., True)")
+            raise ModelError(
+                f"a branch without a last condition: {expression}; end it with (.., True)"
+            )
         decides, then = (yield self._lower(condition)), (yield self._side(value))
-        rest = yield self._piecewise(pairs[1:], whole)
-        return self._decided(decides, self.g.branch(decides, then, rest))
+        otherwise = yield self._piecewise(pairs[1:], expression)
+        return self._decided(decides, self.g.branch(decides, then, otherwise))
 
     def _side(self, value: Any) -> Recursion[Node]:
         """A side; SymPy makes zoo of 1 / Piecewise((a, c), (0, True)) where c does not hold."""
@@ -230,13 +232,13 @@ class Lowering:
         if value.op is not Op.BRANCH:
             return value
         otherwise = value.args[2] if value.args[0] is condition else None
-        known, differences = decidable(self.g, self.domain, condition, otherwise)
-        if known is None:
+        existence, differences = decidable(self.g, self.domain, condition, otherwise)
+        if existence is None:
             return value
         total = self.g.zero
         for d in differences:
             total = self.g.add(total, d)
-        return self.g.branch(known, value, self.g.power(total, 3))
+        return self.g.branch(existence, value, self.g.power(total, 3))
 
     def _extremum(self, e: Any) -> Recursion[Node]:
         result = yield self._lower(e.args[0])
@@ -329,15 +331,15 @@ class Symbols:
 
     def name(self, label: str, node: Node, value: Any, **how: Any) -> Any:
         """A name that SymPy differentiates through (`names.named`); the old one for an old node."""
-        found = self._by_label.get(label)
-        symbol = found if found is not None else named(label, value, **how)
+        existing = self._by_label.get(label)
+        symbol = existing if existing is not None else named(label, value, **how)
         return self._bind(symbol, node)
 
     def named(self, label: str, like: Entries, nodes: Sequence[Node], below: list[Any]) -> Any:
         """Names for `nodes` that depend on `below`, arranged like other values."""
         labels = [label + suffix for suffix in like.suffixes]
         symbols = [
-            self.name(entry, self.graph.name(entry, n), below, known=False)
+            self.name(entry, self.graph.name(entry, n), below, has_definition=False)
             for entry, n in zip(labels, nodes, strict=True)
         ]
         return Entries(symbols, like.suffixes, like.arrange).shaped()
@@ -350,9 +352,9 @@ class Symbols:
 
     def _bind(self, symbol: Any, node: Node) -> Any:
         label = str(symbol)
-        before = self.bound.get(self._by_label.setdefault(label, symbol), node)
-        if before is not node:
-            kinds = " and ".join(dict.fromkeys(map(_kind, (before, node))))
+        previous = self.bound.get(self._by_label.setdefault(label, symbol), node)
+        if previous is not node:
+            kinds = " and ".join(dict.fromkeys(map(_kind, (previous, node))))
             raise ModelError(
                 f"the name {label} is used twice in model {self.model}, for {kinds}: rename one"
             )

@@ -70,11 +70,11 @@ class SympyTape:
         self.meanings.setdefault(symbol, meaning)
         return symbol
 
-    def implicit(self, equations: Any, unknowns: Any, start: Any, found: Sequence[Any]) -> None:
+    def implicit(self, equations: Any, unknowns: Any, start: Any, solution: Sequence[Any]) -> None:
         """Note local unknowns and the names of their solution."""
         for s in unknowns:
             self.meanings[s] = Local()
-        for k, s in enumerate(found):
+        for k, s in enumerate(solution):
             self.define(s, Implicit(tuple(equations), tuple(unknowns), tuple(start), k))
 
     def principal(self, symbol: Any, energy: Any, squares: Any, C: Any) -> Any:
@@ -85,13 +85,13 @@ class SympyTape:
         entries = tuple(sp.sympify(a if a is b else (a + b) / 2) for a, b in pairs)
         return self.define(symbol, Principal(energy, tuple(squares), entries))
 
-    def slopes(
-        self, value: Any, by: Sequence[Any], found: Sequence[Any], shared: Sequence[int]
+    def derivatives(
+        self, value: Any, by: Sequence[Any], symbols: Sequence[Any], shared: Sequence[int]
     ) -> None:
         """Note the names of derivatives of a value, divided by how many entries share them."""
-        for symbol, s, n in zip(found, by, shared, strict=True):
+        for symbol, s, n in zip(symbols, by, shared, strict=True):
             if n == 1:
                 self.define(symbol, Slope(value, s))
             else:
-                whole = self.define(sp.Dummy(real=True), Slope(value, s))
-                self.define(symbol, whole / n)
+                sum_symbol = self.define(sp.Dummy(real=True), Slope(value, s))
+                self.define(symbol, sum_symbol / n)

@@ -48,7 +48,7 @@ class On:
     geometry: str | None = None
     materials: bool = False
 
-    def told(self) -> tuple[str, ...]:
+    def options(self) -> tuple[str, ...]:
         """All of it as texts, for a digest."""
         return (*self.cells, self.geometry or "", "materials" if self.materials else "")
 
@@ -116,22 +116,22 @@ class Page:
         """
         stem, _, facet = cell.partition("_")
         kind = element(stem)
-        chosen = geometry_of(kind.dimension, geometry)
-        name = f"{self.name}_{cell}" + ("_axisymmetric" if chosen == AXISYMMETRIC else "")
+        resolved = geometry_of(kind.dimension, geometry)
+        name = f"{self.name}_{cell}" + ("_axisymmetric" if resolved == AXISYMMETRIC else "")
         if facet:
-            return self._on_facet(name, kind, chosen, facet)
-        if space_of(chosen, kind.dimension) > kind.dimension:
+            return self._on_facet(name, kind, resolved, facet)
+        if space_of(resolved, kind.dimension) > kind.dimension:
             degree = self.degree or 2 * order_of(kind)
-            side = BoundaryModel(name, kind, chosen, rule_of(kind, degree), self.doc)
+            side = BoundaryModel(name, kind, resolved, rule_of(kind, degree), self.doc)
             return self._made(side, side.finish)
         try:
-            point = self._at_point(name, kind, chosen)
+            point = self._at_point(name, kind, resolved)
         except NeedsElement:
             if self.form == "point":
                 raise
             point = None
-        whole = CellModel(name, kind, chosen, self.rule(kind, point), self.doc)
-        made = self._made(whole, whole.finish)
+        model = CellModel(name, kind, resolved, self.rule(kind, point), self.doc)
+        made = self._made(model, model.finish)
         unroll = False if self.form == "point" else None
         at = None if self.form == "whole" else point
         return replace(made, point=at, unroll=unroll)
@@ -214,8 +214,8 @@ class Page:
             if type(error) not in (ModelError, Empty) or error.where.startswith(code.co_filename):
                 raise
             if value is not None and isinstance(error, Empty):
-                words = "returns a value, which is lost: say m.minimise(energy) or m.weak(...)"
-                raise ModelError(f"{error.text}; {self.name} {words}", where) from error
+                remedy = "returns a value, which is lost: say m.minimise(energy) or m.weak(...)"
+                raise ModelError(f"{error.text}; {self.name} {remedy}", where) from error
             raise ModelError(error.text, where) from error
 
     def rule(self, cell: Element, form: PointForm | None) -> QuadratureRule:

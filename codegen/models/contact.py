@@ -37,9 +37,9 @@ def augmented_lagrangian() -> Definition:
         force_weight="factor on the nodal force",
     )
     gap = m.define("gap", n_z * (z + u_z) + n_r * (r + u_r) - c - offset)
-    trial = m.define("trial", lam + rho * gap)
-    touching = trial <= 0
-    force = m.define("force", sp.Piecewise((area * force_weight * trial, touching), (0, True)))
+    augmented = m.define("trial", lam + rho * gap)
+    touching = augmented <= 0
+    force = m.define("force", sp.Piecewise((area * force_weight * augmented, touching), (0, True)))
     slack = m.define("slack", sp.Piecewise((area * gap, touching), (-area * lam / rho, True)))
     m.weak_form([(force * n_z, u_z), (force * n_r, u_r), (slack, lam)])
     m.offer(pseudo_load=True)
@@ -123,8 +123,10 @@ def corner() -> Definition:
     a = m.define("a", wall + fillet - (z + u_z))
     b = m.define("b", lip + fillet - (r + u_r))
     round_off = sp.Piecewise((sp.sqrt(a**2 + b**2), b > 0), (a, True))
-    behind = sp.Piecewise((b, b > 0), (sp.Max(a, b), True))
-    gap = m.define("gap", sp.Piecewise((round_off, a > 0), (behind, True)) - fillet, interface=True)
-    trial = m.define("trial", lam + rho * gap)
-    m.potential(area / (2 * rho) * (sp.Min(trial, 0) ** 2 - lam**2))
+    penetration = sp.Piecewise((b, b > 0), (sp.Max(a, b), True))
+    gap = m.define(
+        "gap", sp.Piecewise((round_off, a > 0), (penetration, True)) - fillet, interface=True
+    )
+    augmented = m.define("trial", lam + rho * gap)
+    m.potential(area / (2 * rho) * (sp.Min(augmented, 0) ** 2 - lam**2))
     return m.finish()

@@ -56,8 +56,8 @@ def _isochoric(m: Material, energy: Energy) -> None:
         I1 = m.define("I1", C.trace())
         W = term(I1, m.define("I2", (I1**2 - (C * C).trace()) / 2))
     m.energy(W + VOLUMETRIC.declared(m.model)(J**2))
-    given = (*energy.parameter_symbols(), *VOLUMETRIC.parameter_symbols())
-    m.require(*(symbol > 0 for symbol in given if str(symbol) in _POSITIVE))
+    parameters = (*energy.parameter_symbols(), *VOLUMETRIC.parameter_symbols())
+    m.require(*(symbol > 0 for symbol in parameters if str(symbol) in _POSITIVE))
 
 
 LAWS = {
@@ -78,10 +78,10 @@ LAWS = {
 
 def law(name: str) -> Law:
     """The law of a name; capitals, hyphens and spaces do not count.  Raises ValueError."""
-    said = "".join(filter(str.isalpha, name.lower()))
-    found = next((LAWS[known] for known in LAWS if known.replace("_", "") == said), None)
-    if found is None:
+    letters = "".join(filter(str.isalpha, name.lower()))
+    match = next((LAWS[key] for key in LAWS if key.replace("_", "") == letters), None)
+    if match is None:
         raise ValueError(
             f"no material is called {name!r}; allowed: {', '.join(LAWS)}, or a file, my_law.py"
         )
-    return found
+    return match

@@ -106,7 +106,7 @@ def _segment(name: str, doc: str, law: rheology.Law, *, rough: bool) -> Definiti
         shear_weight="factor on the shear traction",
     )
     flow = law(m)
-    xi, *ends = m.point()
+    xi, *bounds = m.point()
     N = shapes.line2(xi)
     (w_nodes,) = m.rates("u_z")
     w = m.define("w", shapes.interpolate(N, w_nodes))
@@ -117,7 +117,7 @@ def _segment(name: str, doc: str, law: rheology.Law, *, rough: bool) -> Definiti
     h = m.define("h", shapes.interpolate(N, nodal_h), interface=True)
     V = m.define("V", U - w)
     surfaces, p_a, tau_a = _surfaces(m, h, V, rough)
-    at_ends = [shapes.interpolate(shapes.line2(end), nodal_h) for end in ends]
+    at_ends = [shapes.interpolate(shapes.line2(end), nodal_h) for end in bounds]
     mean, narrowing = _wedge(m, [surfaces.effective_of(h_end) for h_end in at_ends])
     slope = m.define("slope", p_xi / z_xi)
 
@@ -169,17 +169,17 @@ def _segment(name: str, doc: str, law: rheology.Law, *, rough: bool) -> Definiti
 def _one_subcell() -> QuadratureRule:
     """Two Gauss points with the ends of their subcell beside them, here those of the segment."""
     line = quadrature.gauss(2, 1)
-    ends = -sp.Integer(1), sp.Integer(1)
-    return QuadratureRule(3, tuple((*point, *ends) for point in line.points), line.weights)
+    bounds = -sp.Integer(1), sp.Integer(1)
+    return QuadratureRule(3, tuple((*point, *bounds) for point in line.points), line.weights)
 
 
-def _wedge(m: Model, ends: list[Any]) -> tuple[Any, Any]:
+def _wedge(m: Model, bounds: list[Any]) -> tuple[Any, Any]:
     """Mean of the thicknesses h_1, h_2 at the ends of a subcell, and h_1 h_2 over its square.
 
     A flux that is the same all along a wedge asks for the mean of U/2 h^-2 - q h^-3, which are
     1 / (h_1 h_2) and mean / (h_1 h_2)^2.
     """
-    h_1, h_2 = (m.define(f"h_cell_{k}", h) for k, h in enumerate(ends, start=1))
+    h_1, h_2 = (m.define(f"h_cell_{k}", h) for k, h in enumerate(bounds, start=1))
     mean = m.define("h_cell", (h_1 + h_2) / 2)
     return mean, m.define("narrowing", h_1 * h_2 / mean**2)
 
@@ -249,7 +249,9 @@ def _squeeze(name: str, doc: str, *, rough: bool) -> Definition:
     R_rod, rate = m.parameters(
         rod_radius="radius of the rod [mm]", rate="coefficient of the time derivative [1/s]"
     )
-    (rest,) = m.point_data(content_rate="content of the steps before, times theirs [mm^2/s]")
+    (content_rate,) = m.point_data(
+        content_rate="content of the steps before, times theirs [mm^2/s]"
+    )
     (xi,) = m.point()
     N = shapes.line2(xi)
     z_xi = m.define("z_xi", (X[0][1] + u[0][1] - X[0][0] - u[0][0]) / 2)
@@ -260,7 +262,7 @@ def _squeeze(name: str, doc: str, *, rough: bool) -> Definition:
         H = m.define("H", h / sigma, interface=True)
         h_T = m.define("h_T", sigma * roughness.mean_gap(H))
     content = m.define("content", h_T * (1 - v) * z_xi)
-    m.weak_form([(-(rate * content + rest), p)])
+    m.weak_form([(-(rate * content + content_rate), p)])
     m.fields(content=content, dx=m.weight * z_xi, v=v, h_T=h_T)
     return m.finish()
 

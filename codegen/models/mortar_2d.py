@@ -47,23 +47,23 @@ def pair(nodes: int, others: int) -> Definition:
     )
     at = _met(m, _moved(X, u), nodes)
     # where nothing decides, at the start, sides touch and stick
-    trial = m.define("trial", interpolate(at.L, lam) - rho * at.gap)
-    near = sp.Piecewise((trial, (at.gap - reach) * (at.gap + depth) < 0), (0, True))
-    p = m.define("p", sp.Piecewise((near, trial >= 0), (0, True)), interface=True)
+    augmented = m.define("trial", interpolate(at.L, lam) - rho * at.gap)
+    pressure = sp.Piecewise((augmented, (at.gap - reach) * (at.gap + depth) < 0), (0, True))
+    p = m.define("p", sp.Piecewise((pressure, augmented >= 0), (0, True)), interface=True)
     limit = m.define("limit", friction * p)
     stick = m.define("stick", interpolate(at.L, tau) + rho * at.slip(m, _moved(X, old), nodes))
     slides = sp.Piecewise(
         (limit, stick > limit), (-limit, stick < -limit), (stick, friction > 0), (0, True)
     )
-    q = m.define("q", sp.Piecewise((slides, trial >= 0), (0, True)), interface=True)
+    q = m.define("q", sp.Piecewise((slides, augmented >= 0), (0, True)), interface=True)
     area = m.define("area", at.half * _area(nodes, at.xi, [c[:nodes] for c in X], ring))
     force = [
         m.define(f"force_{c}", area * (p * at.n[k] + q * at.t[k]), interface=True) for k, c in _AXES
     ]
-    shares = [*at.N, *(-v for v in at.M)]
+    weights = [*at.N, *(-v for v in at.M)]
     m.weak_form(
         [
-            *((force[k] * v, u[k][a]) for k in (0, 1) for a, v in enumerate(shares)),
+            *((force[k] * v, u[k][a]) for k in (0, 1) for a, v in enumerate(weights)),
             *((area * p * at.L[a] / rho, lam[a]) for a in (0, 1)),
             *((area * q * at.L[a] / rho, tau[a]) for a in (0, 1)),
         ]
@@ -124,33 +124,33 @@ class _Meeting:
     n: list[Any]
     gap: Any
 
-    def slip(self, m: Model, before: _Sides, nodes: int) -> Any:
-        """Motion of the point along the side since its partner and it were at `before`."""
-        came = [interpolate(self.M, c[nodes:]) - interpolate(self.N, c[:nodes]) for c in before]
+    def slip(self, m: Model, previous: _Sides, nodes: int) -> Any:
+        """Motion of the point along the side since its partner and it were at `previous`."""
+        came = [interpolate(self.M, c[nodes:]) - interpolate(self.N, c[:nodes]) for c in previous]
         return m.define("slip", self.t[0] * came[0] + self.t[1] * came[1], interface=True)
 
 
 def _met(m: Model, x: _Sides, nodes: int) -> _Meeting:
     """The point of the side at a quadrature point of the part that both have in common."""
-    mine, other = [c[:nodes] for c in x], [c[nodes:] for c in x]
+    slave, other = [c[:nodes] for c in x], [c[nodes:] for c in x]
     (s,) = m.point()
     # the other side runs the other way
     first, last = (
-        m.define(f"end_{k}", _projected(m, mine, other, k), interface=True) for k in (1, 0)
+        m.define(f"end_{k}", _projected(m, slave, other, k), interface=True) for k in (1, 0)
     )
     half = m.define("half", sp.Max(last - first, 0) / 2)
     xi = m.define("xi_side", (first + last) / 2 + half * s, interface=True)
     N = [m.define(f"N{a}", v) for a, v in enumerate(_shape(nodes, xi))]
-    at = [m.define(f"at_{c}", interpolate(N, mine[k]), interface=True) for k, c in _AXES]
-    slope = [interpolate(_slope(nodes, xi), mine[k]) for k, _ in _AXES]
+    at = [m.define(f"at_{c}", interpolate(N, slave[k]), interface=True) for k, c in _AXES]
+    slope = [interpolate(_slope(nodes, xi), slave[k]) for k, _ in _AXES]
     slope = [m.define(f"slope_{c}", slope[k], interface=True) for k, c in _AXES]
     length = m.define("length", sp.sqrt(slope[0] ** 2 + slope[1] ** 2))
     t = [m.define(f"t_{c}", slope[k] / length) for k, c in _AXES]
     n = [t[1], -t[0]]
     eta = m.define("eta", _partner(m, other, at, t), interface=True)
     M = [m.define(f"M{a}", v) for a, v in enumerate(_shape(len(other[0]), eta))]
-    apart = sum(n[k] * (interpolate(M, other[k]) - at[k]) for k in (0, 1))
-    return _Meeting(half, xi, N, line2(xi), M, t, n, m.define("gap", apart, interface=True))
+    gap = sum(n[k] * (interpolate(M, other[k]) - at[k]) for k in (0, 1))
+    return _Meeting(half, xi, N, line2(xi), M, t, n, m.define("gap", gap, interface=True))
 
 
 def _moved(X: _Sides, u: _Sides) -> list[list[Any]]:
@@ -177,20 +177,20 @@ def _area(nodes: int, xi: Any, x: _Sides, ring: Any) -> Any:
     return sp.sqrt(along[0] ** 2 + along[1] ** 2) * around
 
 
-def _projected(m: Model, mine: _Sides, other: _Sides, end: int) -> Any:
+def _projected(m: Model, slave: _Sides, other: _Sides, end: int) -> Any:
     """Place on the side, -1 to 1, from where a line goes through an end of the other one."""
-    y, nodes = [c[end] for c in other], len(mine[0])
-    chord = [(c[1] - c[0]) / 2 for c in mine]
-    off = [y[k] - (mine[k][0] + mine[k][1]) / 2 for k in (0, 1)]
-    found = _inside((chord[0] * off[0] + chord[1] * off[1]) / (chord[0] ** 2 + chord[1] ** 2))
+    y, nodes = [c[end] for c in other], len(slave[0])
+    chord = [(c[1] - c[0]) / 2 for c in slave]
+    offset = [y[k] - (slave[k][0] + slave[k][1]) / 2 for k in (0, 1)]
+    start = _inside((chord[0] * offset[0] + chord[1] * offset[1]) / (chord[0] ** 2 + chord[1] ** 2))
     for step in range(_STEPS if nodes == 3 else 0):
-        xi = m.define(f"meets_{end}_{step}", found)
-        at = [interpolate(_shape(nodes, xi), c) for c in mine]
-        t = [interpolate(_slope(nodes, xi), mine[k]) for k in (0, 1)]
+        xi = m.define(f"meets_{end}_{step}", start)
+        at = [interpolate(_shape(nodes, xi), c) for c in slave]
+        t = [interpolate(_slope(nodes, xi), slave[k]) for k in (0, 1)]
         t = [m.define(f"along_{end}_{step}_{k}", t[k]) for k in (0, 1)]
         ahead = t[0] * (y[0] - at[0]) + t[1] * (y[1] - at[1])
-        found = _inside(xi + ahead / (t[0] ** 2 + t[1] ** 2))
-    return found
+        start = _inside(xi + ahead / (t[0] ** 2 + t[1] ** 2))
+    return start
 
 
 def _inside(xi: Any) -> Any:

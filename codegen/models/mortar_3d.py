@@ -40,18 +40,18 @@ def touch() -> Definition:
     n = [m.define(f"n_{c}", across[k] / length) for k, c in _AXES]
     gap = m.define("gap", _dot(r, n))
     # where nothing decides, at the start, sides touch and stick
-    trial = m.define("trial", lam - rho * gap)
-    near = sp.Piecewise((trial, (gap - reach) * (gap + depth) < 0), (0, True))
-    p = m.define("p", sp.Piecewise((near, trial >= 0), (0, True)))
-    whole = [m.define(f"stick_{c}", tau[k] + rho * came[k]) for k, c in _AXES]
-    off = m.define("stick_n", _dot(whole, n))
-    along = [m.define(f"along_{c}", whole[k] - off * n[k]) for k, c in _AXES]
+    augmented = m.define("trial", lam - rho * gap)
+    pressure = sp.Piecewise((augmented, (gap - reach) * (gap + depth) < 0), (0, True))
+    p = m.define("p", sp.Piecewise((pressure, augmented >= 0), (0, True)))
+    stick_traction = [m.define(f"stick_{c}", tau[k] + rho * came[k]) for k, c in _AXES]
+    normal_part = m.define("stick_n", _dot(stick_traction, n))
+    along = [m.define(f"along_{c}", stick_traction[k] - normal_part * n[k]) for k, c in _AXES]
     square, limit = m.define("square", _dot(along, along)), m.define("limit", friction * p)
     slides = square > limit**2
     size = sp.sqrt(sp.Piecewise((square, slides), (1, True)))
     share = m.define("share", sp.Piecewise((limit / size, slides), (1, friction > 0), (0, True)))
     q = [
-        m.define(f"q_{c}", sp.Piecewise((share * along[k], trial >= 0), (0, True)))
+        m.define(f"q_{c}", sp.Piecewise((share * along[k], augmented >= 0), (0, True)))
         for k, c in _AXES
     ]
     m.weak_form(
@@ -80,8 +80,8 @@ def face(nodes: int) -> Definition:
     multipliers = m.nodal_unknowns("lambda", "tau_x", "tau_y", "tau_z", nodes=len(flat.nodes))
     (rho,) = m.data(rho="augmentation parameter [MPa/mm]")
     at, x = m.point(), _moved(X, u)
-    N, L, slopes = cell.shape(*at), flat.shape(*at), cell.gradient(*at)
-    area, now = m.define("area", _area(X, slopes)), m.define("area_now", _area(x, slopes))
+    N, L, gradients = cell.shape(*at), flat.shape(*at), cell.gradient(*at)
+    area, now = m.define("area", _area(X, gradients)), m.define("area_now", _area(x, gradients))
     values = [m.define(f"value_{k}", interpolate(L, v)) for k, v in enumerate(multipliers)]
     pairs = zip(values, multipliers, strict=True)
     m.weak_form([(-area * p * v / rho, t[a]) for p, t in pairs for a, v in enumerate(L)])
@@ -91,9 +91,9 @@ def face(nodes: int) -> Definition:
     return m.finish()
 
 
-def _area(x: _Columns, slopes: Sequence[Sequence[Any]]) -> Any:
+def _area(x: _Columns, gradients: Sequence[Sequence[Any]]) -> Any:
     """Per parent area, by the derivatives of the shape functions."""
-    first, second = ([interpolate([g[d] for g in slopes], c) for c in x] for d in (0, 1))
+    first, second = ([interpolate([g[d] for g in gradients], c) for c in x] for d in (0, 1))
     across = _cross(first, second)
     return sp.sqrt(_dot(across, across))
 

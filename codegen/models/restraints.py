@@ -45,7 +45,7 @@ def mean_axial() -> Definition:
     """Constraint on the mean axial displacement of the section, with the force as its multiplier.
 
     Potential N / A * integral of (u_z - place) dA, A the area of the section: the force N [N] is
-    work-conjugate to `place`, and acts on the section with the opposite sign.
+    work-conjugate to `target`, and acts on the section with the opposite sign.
     """
     m = Model(
         "mean_axial",
@@ -57,13 +57,13 @@ def mean_axial() -> Definition:
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r", idle=["u_r"])
     force = m.unknown("force")
-    area, place = m.parameters(
+    area, target = m.parameters(
         area="area of the section [mm^2]",
         place="prescribed mean axial displacement [mm]",
     )
     xi, eta = m.point()
     e = kin.quad4(m, "", X, xi, eta)
-    density = force / area * e.detJ * (shapes.interpolate(e.N, u[0]) - place)
+    density = force / area * e.detJ * (shapes.interpolate(e.N, u[0]) - target)
     m.potential(m.integral("constraint", density))
     m.offer(pseudo_load=True)
     return m.finish()

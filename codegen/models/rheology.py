@@ -75,10 +75,10 @@ def _hyperbolic(S: Any) -> tuple[Any, Any]:
     for k in reversed(range(_TERMS)):
         term = sp.Rational(1, sp.factorial(2 * k + 1))
         mean, moment = term + S**2 * mean, 3 * term / (2 * k + 3) + S**2 * moment
-    near = S**2 < 1
+    small = S**2 < 1
     return (
-        sp.Piecewise((mean, near), (sp.sinh(S) / S, True)),
-        sp.Piecewise((moment, near), (3 * (S * sp.cosh(S) - sp.sinh(S)) / S**3, True)),
+        sp.Piecewise((mean, small), (sp.sinh(S) / S, True)),
+        sp.Piecewise((moment, small), (3 * (S * sp.cosh(S) - sp.sinh(S)) / S**3, True)),
     )
 
 

@@ -58,11 +58,11 @@ def shear_stress(H: Any) -> Any:
     """Factor phi_f of the mean of eta U / h, for heights up to 3 sigma; asperities from 0.01 on."""
     z = H / 3
     cubic = (1 - z**2) ** 3
-    near = cubic * sp.log((z + 1) / (z - 1)) + z / 15 * (66 + z**2 * (30 * z**2 - 80))
+    close_form = cubic * sp.log((z + 1) / (z - 1)) + z / 15 * (66 + z**2 * (30 * z**2 - 80))
     tail = z * (132 + z * (345 + z * (-160 + z * (-405 + z * (60 + 147 * z)))))
     mixed = cubic * sp.log(300 * (z + 1)) + R(1, 60) * (-55 + tail)
     factor = R(35, 32) * z
-    return sp.Piecewise((_far(z), z >= 2), (factor * near, z > 1), (factor * mixed, True))
+    return sp.Piecewise((_far(z), z >= 2), (factor * close_form, z > 1), (factor * mixed, True))
 
 
 def _far(z: Any) -> Any:

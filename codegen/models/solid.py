@@ -184,9 +184,9 @@ def _about_mean(m: Model, X: Any, e: kin.Quad4, weights: tuple[Any, Any]) -> Any
 
     s, t = m.define("s", xi - mean("xi", ring * xi)), m.define("t", eta - mean("eta", ring * eta))
     bulge = []  # grad(xi eta)
-    for c, here, there in zip("zr", _parent_slopes(e), _parent_slopes(centre), strict=True):
-        first = (t * there[0] + s * there[1]) / centre.detJ
-        bulge.append(both(f"bulge_{c}", e.R * (eta * here[0] + xi * here[1]), first))
+    for c, local, central in zip("zr", _parent_slopes(e), _parent_slopes(centre), strict=True):
+        first = (t * central[0] + s * central[1]) / centre.detJ
+        bulge.append(both(f"bulge_{c}", e.R * (eta * local[0] + xi * local[1]), first))
     # N_a / R = (1 + p xi + q eta + p q xi eta) / (4 R); the last term has no mean
     (R_xi, R_eta), scale = centre.dX[1], 1 / (4 * centre.R)
     hoop = [

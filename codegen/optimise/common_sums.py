@@ -34,10 +34,10 @@ LONG = 200
 
 def share(g: Graph, rows: Sequence[Row]) -> None:
     """Replace the most frequent pair of terms by one value until no pair is shared."""
-    at = _places(rows)
+    at = _rows_with(rows)
     if any(sum(len(at[n]) > 1 for n in row) > LONG for row in rows):
         _bundle(g, rows, at)
-        at = _places(rows)
+        at = _rows_with(rows)
     table = _Pairs(g, rows, at)
     while (pair := table.best()) is not None:
         table.replace(pair)
@@ -62,7 +62,7 @@ def insert(g: Graph, row: Row, value: Node, sign: int) -> None:
         row[value] = sign
 
 
-def _places(rows: Sequence[Row]) -> dict[Node, set[int]]:
+def _rows_with(rows: Sequence[Row]) -> dict[Node, set[int]]:
     """The rows in which each term stands."""
     at: dict[Node, set[int]] = {}
     for k, row in enumerate(rows):
@@ -74,9 +74,9 @@ def _places(rows: Sequence[Row]) -> dict[Node, set[int]]:
 def _bundle(g: Graph, rows: Sequence[Row], at: dict[Node, set[int]]) -> None:
     """Sum the terms that stand in the same rows with the same signs relative to each other."""
     groups: dict[tuple[tuple[int, int], ...], list[Node]] = {}
-    for n, places in at.items():
-        if len(places) > 1:
-            order = sorted(places)
+    for n, rows_with in at.items():
+        if len(rows_with) > 1:
+            order = sorted(rows_with)
             lead = rows[order[0]][n]
             groups.setdefault(tuple((k, rows[k][n] * lead) for k in order), []).append(n)
     for key, nodes in groups.items():
@@ -143,14 +143,14 @@ class _Pairs:
             sign = row[a] * lead
             self._remove(k, a)
             self._remove(k, b)
-            before = value
-            while row.get(before) == sign:
-                self._remove(k, before)
-                before = self.g.mul(self.g.const(2), before)
-            if before in row:
-                self._remove(k, before)
+            previous = value
+            while row.get(previous) == sign:
+                self._remove(k, previous)
+                previous = self.g.mul(self.g.const(2), previous)
+            if previous in row:
+                self._remove(k, previous)
             else:
-                self._add(k, before, sign)
+                self._add(k, previous, sign)
 
     def _remove(self, k: int, n: Node) -> None:
         row = self.rows[k]
@@ -161,14 +161,14 @@ class _Pairs:
         self.at[n].discard(k)
 
     def _add(self, k: int, n: Node, sign: int) -> None:
-        row, places = self.rows[k], self.at.setdefault(n, set())
+        row, rows_with = self.rows[k], self.at.setdefault(n, set())
         self.nodes[n.id] = n
         row[n] = sign
-        places.add(k)
-        if len(places) == 2:  # noted nowhere while it stood in one row
-            (first,) = places - {k}
+        rows_with.add(k)
+        if len(rows_with) == 2:  # noted nowhere while it stood in one row
+            (first,) = rows_with - {k}
             self._note(first, ((n, m) for m in self._shared(self.rows[first]) if m is not n))
-        if len(places) > 1:
+        if len(rows_with) > 1:
             self._note(k, ((n, m) for m in self._shared(row) if m is not n))
 
 
@@ -275,7 +275,7 @@ class _Plan:
         for value, c in terms.items():
             by_size.setdefault(abs(c), {})[value] = 1 if c > 0 else -1
         pieces = []
-        rest: Row = {}
+        remainder: Row = {}
         for size, row in by_size.items():
             if len(row) == 1 or len(by_size) == 1:
                 scale = Fraction(1) if len(by_size) > 1 else size
@@ -288,11 +288,11 @@ class _Plan:
                     pieces.append((size, self._row(one)))
                 else:
                     for value, sign in one.items():
-                        insert(self.g, rest, value, sign)
+                        insert(self.g, remainder, value, sign)
             else:
                 pieces.append((size, self._row(row)))
-        if rest:
-            pieces.append((Fraction(1), self._row(rest)))
+        if remainder:
+            pieces.append((Fraction(1), self._row(remainder)))
         self.pieces[n] = pieces
 
     def _row(self, row: Row) -> int:

@@ -126,14 +126,14 @@ class _Shared:
 
     def take(self, f: Node) -> list[Term]:
         """Take away the terms that have a factor."""
-        taken = [k for k in self.where[f] if k in self.left]
-        for k in taken:
+        rows = [k for k in self.where[f] if k in self.left]
+        for k in rows:
             del self.left[k]
             for other in dict.fromkeys(self.terms[k][1]):
                 self.count[other] -= 1
-        return [self.terms[k] for k in taken]
+        return [self.terms[k] for k in rows]
 
-    def rest(self) -> list[Term]:
+    def remainder(self) -> list[Term]:
         """The terms that are left."""
         return [self.terms[k] for k in self.left]
 
@@ -148,7 +148,7 @@ def _factored(g: Graph, terms: Sequence[Term]) -> Recursion[Node]:
             others.remove(best)
             inside.append((s, others or [g.one]))
         groups.append(g.mul(best, (yield _factored(g, inside))))
-    result = _sum(g, [(s, product(g, factors)) for s, factors in shared.rest()])
+    result = _sum(g, [(s, product(g, factors)) for s, factors in shared.remainder()])
     for group in reversed(groups):
         result = g.add(result, group)
     return result

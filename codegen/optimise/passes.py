@@ -157,28 +157,30 @@ def assume(g: Graph, roots: Roots) -> Roots:
     """Inside one side of a branch its condition is known: drop inner branches on it."""
     memo: dict[tuple[Node, tuple[tuple[Node, bool], ...]], Node] = {}
     nodes = reachable(roots)
-    asked = _asked(nodes)
+    conditions = _conditions_below(nodes)
 
-    def visit(n: Node, known: tuple[tuple[Node, bool], ...]) -> Recursion[Node]:
-        known = tuple(k for k in known if k[0] in asked[n])  # others decide nothing below it
-        key = (n, known)
+    def visit(n: Node, assumed: tuple[tuple[Node, bool], ...]) -> Recursion[Node]:
+        assumed = tuple(
+            k for k in assumed if k[0] in conditions[n]
+        )  # others decide nothing below it
+        key = (n, assumed)
         if key not in memo:
-            memo[key] = yield build(n, known)
+            memo[key] = yield build(n, assumed)
         return memo[key]
 
-    def build(n: Node, known: tuple[tuple[Node, bool], ...]) -> Recursion[Node]:
+    def build(n: Node, assumed: tuple[tuple[Node, bool], ...]) -> Recursion[Node]:
         if n.op is not Op.BRANCH:
             args = []
             for a in n.args:
-                args.append((yield visit(a, known)))
+                args.append((yield visit(a, assumed)))
             return g.rebuild(n.op, args, n.payload)
         c, then, otherwise = n.args
-        for condition, holds in known:
+        for condition, holds in assumed:
             if condition is c:
-                return (yield visit(then if holds else otherwise, known))
-        order = tuple(sorted((*known, (c, True)), key=lambda k: k[0].id))
-        negated = tuple(sorted((*known, (c, False)), key=lambda k: k[0].id))
-        decides = yield visit(c, known)
+                return (yield visit(then if holds else otherwise, assumed))
+        order = tuple(sorted((*assumed, (c, True)), key=lambda k: k[0].id))
+        negated = tuple(sorted((*assumed, (c, False)), key=lambda k: k[0].id))
+        decides = yield visit(c, assumed)
         return g.branch(decides, (yield visit(then, order)), (yield visit(otherwise, negated)))
 
     if all(n.op is not Op.BRANCH for n in nodes):
@@ -188,13 +190,13 @@ def assume(g: Graph, roots: Roots) -> Roots:
     return [memo[r, ()] for r in roots]
 
 
-def _asked(nodes: Sequence[Node]) -> dict[Node, frozenset[Node]]:
+def _conditions_below(nodes: Sequence[Node]) -> dict[Node, frozenset[Node]]:
     """Conditions of the branches at and below each node; operands come before their users."""
-    found: dict[Node, frozenset[Node]] = {}
+    conditions: dict[Node, frozenset[Node]] = {}
     for n in nodes:
-        own = frozenset(n.args[:1]) if n.op is Op.BRANCH else frozenset()
-        found[n] = own.union(*(found[a] for a in n.args))
-    return found
+        condition = frozenset(n.args[:1]) if n.op is Op.BRANCH else frozenset()
+        conditions[n] = condition.union(*(conditions[a] for a in n.args))
+    return conditions
 
 
 def literals(g: Graph, roots: Roots) -> Roots:
@@ -202,8 +204,8 @@ def literals(g: Graph, roots: Roots) -> Roots:
     value: dict[Node, mpmath.mpf] = {}
 
     def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
-        known = all(a.op is Op.CONST for a in args) and (bool(args) or n.op is Op.PI)
-        if not known or n.op in (Op.SUM, Op.BRANCH, Op.CALL) or n.op in BOOLEAN:
+        constant = all(a.op is Op.CONST for a in args) and (bool(args) or n.op is Op.PI)
+        if not constant or n.op in (Op.SUM, Op.BRANCH, Op.CALL) or n.op in BOOLEAN:
             return g.rebuild(n.op, args, n.payload)
         with mpmath.workdps(50):
             exact = [value.get(o, _exact(a)) for o, a in zip(n.args, args, strict=True)]

@@ -103,7 +103,7 @@ def _for_derivatives(source: Path | Definition | Page | Law, where: Where) -> Pa
         key = None if read is None else key
     else:
         found = _definitions(source, where)
-    free = [d for d in found if not d.given]
+    free = [d for d in found if not d.prescribed]
     if not free:
         names = ", ".join(d.name for d in found)
         raise ModelFileError(f"{names}: gives derivatives of its own, and results have none by it")
@@ -150,7 +150,7 @@ def of_files(paths: Sequence[Path], on: On | None = None) -> tuple[list[Definiti
     if len(paths) > 1:
         return found, library(found, check=False)
     read = runs[0][1].beyond(paths[0], known[0])
-    key = None if read is None else _file_key(known[0], *on.told())
+    key = None if read is None else _file_key(known[0], *on.options())
     return found, library(found, key, read, check=False)
 
 

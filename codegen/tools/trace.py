@@ -36,20 +36,20 @@ def show(definition: Definition) -> None:
 
 
 def _stages(d: Definition, f: Function) -> Iterator[tuple[str, str]]:
-    yield "interfaces", _interfaces(d, f.found)
-    yield "invariants", _invariants(f.found)
+    yield "interfaces", _interfaces(d, f.structure)
+    yield "invariants", _invariants(f.structure)
     for k, a in enumerate(f.attempts, 1):
         how = ", loop over the points written out" if a.unrolled else ""
         yield f"chain rule {k}", f"{a.rule}{how}: {a.operations} operations of one element"
     if len(f.attempts) > 1:
-        yield "choice", f"chain rule {f.attempts.index(f.chosen) + 1}"
+        yield "choice", f"chain rule {f.attempts.index(f.best) + 1}"
     plan = f.plan
     loops = sum(stage.loop is not None for stage in plan.stages)
     per_point = f", {plan.operations_per_point} at each point" if loops else ""
     yield "schedule", f"{plan.operations_once} operations once{per_point}; {_count(loops, 'loop')}"
-    before, after = peak_live(f.chosen.plan), peak_live(plan)
+    before, after = peak_live(f.best.plan), peak_live(plan)
     moved = f"{before} values live at most, {after} in the printed order"
-    yield "order", moved if plan is not f.chosen.plan else f"as scheduled, {after} values live"
+    yield "order", moved if plan is not f.best.plan else f"as scheduled, {after} values live"
     yield "print", f"{f.printer}: {f.temporaries} temporaries, {f.text.count(chr(10))} lines of C"
 
 
@@ -77,9 +77,9 @@ def _passes(f: Function) -> Table:
     The loop over the points, written out or not, decides which passes there are.
     """
     table = Table("pass", box=box.SIMPLE_HEAD)
-    rules = [a for a in f.attempts if a.unrolled is f.chosen.unrolled]
+    rules = [a for a in f.attempts if a.unrolled is f.best.unrolled]
     for k, a in ((k, a) for k, a in enumerate(f.attempts, 1) if a in rules):
-        label = f"rule {k}{'*' if a is f.chosen else ''}" if len(rules) > 1 else ""
+        label = f"rule {k}{'*' if a is f.best else ''}" if len(rules) > 1 else ""
         table.add_column(f"{label} nodes".strip(), justify="right")
         table.add_column("operations", justify="right")
     for rows in zip(*(a.passes for a in rules), strict=True):

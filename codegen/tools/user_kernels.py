@@ -120,7 +120,7 @@ def _generate(paths: Sequence[Path], folder: Path, seconds: float, on: On) -> in
         print(f"{name}: {report.told(seconds)}")
         if report.tasks:
             unchecked.append(f"{name}: {report.untold(seconds)}")
-    for d in (d for d in definitions if d.given):
+    for d in (d for d in definitions if d.prescribed):
         print(f"{d.name} gives derivatives of its own: residual and tangent were not compared")
     for d in definitions:
         for task in (t for t, e in errors.get(d.name, {}).items() if e == math.inf):

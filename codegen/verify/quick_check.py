@@ -40,7 +40,7 @@ def check(d: Definition, tasks: Sequence[str], library: Path) -> None:
     Models without such a state, and those that give derivatives of their own, are left out.
     """
     try:
-        states = [] if d.given else admissible(d, STATES)
+        states = [] if d.prescribed else admissible(d, STATES)
     except NoStateError:
         return
     called = ctypes.CDLL(str(library))

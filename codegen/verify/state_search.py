@@ -172,7 +172,7 @@ class Explorer:
         slopes: dict[str, list[float]] = {}
         out = []
         for k, v in enumerate(s.dofs):
-            name, node = self.d.places[k] if k < len(self.d.places) else ("", None)
+            name, node = self.d.dof_nodes[k] if k < len(self.d.dof_nodes) else ("", None)
             if name not in slopes:
                 slopes[name] = [scale * self.rng.uniform(-1, 1) for _ in range(width + 1)]
             first, *rest = slopes[name]
@@ -245,7 +245,7 @@ class Explorer:
         """Every unknown of one name together, then every argument alone."""
         base, first = _flat(s), len(s.coordinates)
         count = len(s.dofs)
-        names = [n for n, _ in self.d.places] + [""] * (count - len(self.d.places))
+        names = [n for n, _ in self.d.dof_nodes] + [""] * (count - len(self.d.dof_nodes))
         order = sorted(range(count), key=lambda k: names[k])
         groups = [list(g) for _, g in groupby(order, key=lambda k: names[k])]
         for members in [g for g in groups if len(g) > 1] + [[k] for k in range(count)]:

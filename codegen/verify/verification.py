@@ -65,7 +65,9 @@ def check(
     there is one. If it gives a derivative of its own, only energy and fields can be compared.
     """
     start = perf_counter()
-    tasks = [t for t in tasks if not definition.given or t in (abi.Task.ENERGY, abi.Task.FIELDS)]
+    tasks = [
+        t for t in tasks if not definition.prescribed or t in (abi.Task.ENERGY, abi.Task.FIELDS)
+    ]
     states = random_states.admissible(definition, BATCH)
     comparison = Comparison(definition, written or definition, library, start + seconds)
     report = comparison.report
@@ -91,7 +93,9 @@ def check(
 
 def culprit(d: Definition, task: str) -> str | None:
     """Expression without a value in a task whose result is not a number, for the page's author."""
-    slopes = gradient(d.graph, d.potential, d.directions, constant=d.constant, given=d.given)
+    slopes = gradient(
+        d.graph, d.potential, d.directions, constant=d.constant, prescribed=d.prescribed
+    )
     states = random_states.admissible(d, BATCH)
     for nodes in ([slopes[u] for u in d.directions], [x.node for x in outputs(d, task)]):
         for state in states:

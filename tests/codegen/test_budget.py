@@ -44,7 +44,7 @@ def test_one_operation_more_is_seen(cost: str) -> None:
 
 def intervals(plan: Schedule) -> int:
     """Peak of a straight line by another count: overlaps of [computed, last read)."""
-    order = plan.stages[0].before
+    order = plan.stages[0].preamble
     at = {n: k for k, n in enumerate(order)}
     last = dict(at)
     for n in order:

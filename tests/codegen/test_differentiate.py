@@ -243,8 +243,8 @@ def test_a_given_derivative_replaces_the_true_one() -> None:
     given_ = {special: {x: slope}}
     root = g.add(g.mul(special, special), g.mul(x, y))
     in_x = g.add(g.mul(g.const(2), g.mul(special, slope)), y)
-    adjoint = gradient(g, root, wrt, given=given_)
-    linear = Linearisation(g, wrt, given=given_)
+    adjoint = gradient(g, root, wrt, prescribed=given_)
+    linear = Linearisation(g, wrt, prescribed=given_)
     for k, expected in ((0, in_x), (1, x), (2, g.zero)):
         assert same_value(adjoint[wrt[k]], expected, AT)
         assert same_value(linear.derivative(root, k), expected, AT)
@@ -258,8 +258,8 @@ def test_a_given_derivative_can_be_the_chain_rule_by_hand() -> None:
     outer = g.name("e", g.call(Op.EXP, inner))
     given_ = {outer: {inner: outer}}
     root = g.mul(outer, y)
-    adjoint = gradient(g, root, wrt, given=given_)
-    linear = Linearisation(g, wrt, given=given_)
+    adjoint = gradient(g, root, wrt, prescribed=given_)
+    linear = Linearisation(g, wrt, prescribed=given_)
     assert right([adjoint[u] for u in wrt], root, AT)
     assert right([linear.derivative(root, j) for j in range(3)], root, AT)
 

@@ -279,12 +279,12 @@ def test_short_loops_are_written_out_and_long_ones_are_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     short = pipeline.compile_task(branched(), "tangent")
-    assert short.chosen.unrolled
-    assert short.chosen.operations == min(a.operations for a in short.attempts)
+    assert short.best.unrolled
+    assert short.best.operations == min(a.operations for a in short.attempts)
     kept = pipeline.compile_task(replace(branched(), unroll=False), "tangent")
     assert not any(a.unrolled for a in kept.attempts)
     monkeypatch.setattr(pipeline, "SHORT", 10)
-    assert not pipeline.compile_task(branched(), "tangent").chosen.unrolled
+    assert not pipeline.compile_task(branched(), "tangent").best.unrolled
 
 
 def test_a_long_file_is_compiled_lightly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -68,7 +68,7 @@ def test_values_of_a_long_page_are_those_of_the_oracle(
 @pytest.mark.slow
 def test_ten_thousand_names() -> None:
     functions = pipeline.compile_model(chain(10_000, "residual")).functions
-    assert functions["residual"].chosen.operations > 10_000
+    assert functions["residual"].best.operations > 10_000
 
 
 def test_a_deep_expression_is_lowered() -> None:

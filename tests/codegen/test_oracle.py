@@ -57,9 +57,8 @@ CHOSEN = {
 """The cases that are compared in every run: as few as take both sides of every branch; the first
 case of any other family."""
 
-DEAR = ("mortar_23", "mortar_32", "mortar_33", "touch_side_8", "touch_side_9")
 EVERY = [
-    *(pytest.param(f, marks=[pytest.mark.slow] * (f in DEAR)) for f in ALL),
+    *ALL,
     *(pytest.param(f"{f}, everywhere", marks=pytest.mark.slow) for f in ALL),
 ]
 """Families with their chosen cases, and with all."""
@@ -283,7 +282,7 @@ def test_a_kernel_that_forgets_a_dependence_is_refused(
     """Compiled from the real page, with the derivative of one intermediate declared to be none."""
     d = definition(family)
     (node,) = (n for n in reachable([d.potential]) if n.op is Op.NAME and n.payload == forgotten)
-    kernel = compiled(replace(d, given={**d.given, node: {}}), tmp_path)
+    kernel = compiled(replace(d, prescribed={**d.prescribed, node: {}}), tmp_path)
     case = cases(family)[0]
     R, K = exact(family, case.label)
     found_R, found_K = called(case, kernel)

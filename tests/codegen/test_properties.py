@@ -292,7 +292,7 @@ class _Machine:
 
     def run(self, plan: Schedule) -> None:
         for stage in plan.stages:
-            self.block(stage.before)
+            self.block(stage.preamble)
             if stage.loop is None:
                 continue
             self.store.update(dict.fromkeys(stage.loop.sums, mpmath.mpf(0)))
@@ -330,7 +330,7 @@ def test_a_wrong_order_is_refused() -> None:
     plan = schedule([root])
     state = State((), ["0.3"])
     assert executed(plan, [root], state)
-    first, second, *_ = plan.stages[0].before
-    plan.stages[0].before[:2] = [second, first]
+    first, second, *_ = plan.stages[0].preamble
+    plan.stages[0].preamble[:2] = [second, first]
     with pytest.raises(KeyError):
         executed(plan, [root], state)

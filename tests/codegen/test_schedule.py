@@ -48,7 +48,7 @@ def block(*roots: Node) -> list[Statement]:
     plan = schedule(roots)
     assert len(plan.stages) == 1
     assert plan.stages[0].loop is None
-    statements = plan.stages[0].before
+    statements = plan.stages[0].preamble
     found = list(nodes_of(statements))
     assert len(found) == len(set(found)) == plan.operations_once
     assert_operands_first(statements, set())
@@ -74,12 +74,12 @@ def test_a_sum_that_feeds_a_sum_takes_two_loops() -> None:
     root = g.mul(total, x)
     plan = schedule([root])
     first, second, last = plan.stages
-    assert first.before == []
+    assert first.preamble == []
     assert loop_of(first.loop).sums == (mean,)
-    assert second.before == [scaled]
+    assert second.preamble == [scaled]
     assert loop_of(second.loop).sums == (total,)
     assert set(nodes_of(loop_of(second.loop).body)) == {deviation, total.args[0]}
-    assert last.before == [root]
+    assert last.preamble == [root]
     assert last.loop is None
     assert (plan.operations_once, plan.operations_per_point) == (2, 2 + 3)
 

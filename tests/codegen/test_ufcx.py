@@ -191,7 +191,7 @@ def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -
     place = tmp_path_factory.mktemp("random")
     kernels, batch = cell_kernels(d, place), compiled(d, place)
     (s,) = random_states.admissible(d, 1)
-    at, dim = emit_ufcx.places(d), len(d.coordinates)
+    at, dim = emit_ufcx.vertex_positions(d), len(d.coordinates)
     w, vertices = np.empty(len(at)), np.zeros((d.nodes, 3))
     w[at] = s.dofs
     vertices[list(emit_ufcx.vertices(d)), :dim] = np.reshape(s.coordinates, (d.nodes, dim))

@@ -23,13 +23,13 @@ DIGITS = 40
 class Line:
     """Shape functions of a product along one direction.
 
-    values: [point][node] of a line, slopes too. places: of every node of the cell its nodes along
-    the directions.
+    values: [point][node] of a line, derivatives too. node_indices: of every node of the cell its
+    nodes along the directions.
     """
 
     values: tuple[tuple[float, ...], ...]
-    slopes: tuple[tuple[float, ...], ...]
-    places: tuple[tuple[int, ...], ...]
+    derivatives: tuple[tuple[float, ...], ...]
+    node_indices: tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Shape:
 
     order: int
     values: tuple[tuple[float, ...], ...]
-    slopes: tuple[tuple[tuple[float, ...], ...], ...]
+    derivatives: tuple[tuple[tuple[float, ...], ...], ...]
     line: Line | None
     long: bool = False
 
@@ -55,24 +55,24 @@ class Shape:
         """Tables NAME_N<order>, NAME_D<order>, of products of lines also NAME_L<order>,
         NAME_M<order> (values and slopes of the line) and NAME_along<order>, by name.
         """
-        found: dict[str, Callable[[], str]] = {}
+        writers: dict[str, Callable[[], str]] = {}
 
         def table(letter: str, values: Any) -> None:
             label = f"{name}_{letter}{self.order}"
-            found[label] = lambda: _array(label, values)
+            writers[label] = lambda: _array(label, values)
 
         table("N", self.values)
         if self.line is None:
-            table("D", self.slopes)
+            table("D", self.derivatives)
         else:
             line = self.line
-            slopes = f"{name}_D{self.order}"
-            found[slopes] = lambda: _slopes(slopes, line)
+            derivative_name = f"{name}_D{self.order}"
+            writers[derivative_name] = lambda: _derivative_table(derivative_name, line)
             table("L", line.values)
-            table("M", line.slopes)
+            table("M", line.derivatives)
             label = f"{name}_along{self.order}"
-            found[label] = lambda: _whole_numbers(label, line.places)
-        return found
+            writers[label] = lambda: _whole_numbers(label, line.node_indices)
+        return writers
 
 
 @cache
@@ -81,8 +81,8 @@ def shape(order: int, cell: Element, rule: QuadratureRule) -> Shape:
     line = _line(cell, rule)
     if cell.lines is not None and line is not None:
         return Shape(order, *_products(line, cell.dimension), line, long=True)
-    values, slopes = _evaluated(cell.shape, cell.gradient, rule.points, cell.dimension)
-    return Shape(order, values, slopes, line)
+    values, derivatives = _evaluated(cell.shape, cell.gradient, rule.points, cell.dimension)
+    return Shape(order, values, derivatives, line)
 
 
 def constant(points: int, dimension: int) -> Shape:
@@ -97,20 +97,20 @@ def _evaluated(
     N = [sp.sympify(v) for v in function(*at)]
     flat = [*N, *(v for row in gradient(*at) for v in row)]
     compiled = sp.lambdify(at, flat, "mpmath")
-    values, slopes = [], []
+    values, derivatives = [], []
     with mpmath.workdps(DIGITS):
         for p in points:
-            found = [float(v) for v in compiled(*(mpmath.mpf(sp.N(x, DIGITS)) for x in p))]
-            values.append(tuple(found[: len(N)]))
-            rest = found[len(N) :]
-            starts = range(0, len(rest), dimension)
-            slopes.append(tuple(tuple(rest[k : k + dimension]) for k in starts))
-    return tuple(values), tuple(slopes)
+            numbers = [float(v) for v in compiled(*(mpmath.mpf(sp.N(x, DIGITS)) for x in p))]
+            values.append(tuple(numbers[: len(N)]))
+            flat_derivatives = numbers[len(N) :]
+            starts = range(0, len(flat_derivatives), dimension)
+            derivatives.append(tuple(tuple(flat_derivatives[k : k + dimension]) for k in starts))
+    return tuple(values), tuple(derivatives)
 
 
 def _line(cell: Element, rule: QuadratureRule) -> Line | None:
     """The line that a cell of all products is made of, with the points of the rule along it."""
-    sides = sorted({c for place in cell.nodes for c in place}, key=lambda c: (abs(c) != 1, c))
+    sides = sorted({c for node in cell.nodes for c in node}, key=lambda c: (abs(c) != 1, c))
     count = round(len(rule.points) ** (1 / cell.dimension))
     of_lines = len(cell.nodes) == len(sides) ** cell.dimension and -1 in sides
     if not of_lines or count**cell.dimension != len(rule.points):
@@ -120,7 +120,7 @@ def _line(cell: Element, rule: QuadratureRule) -> Line | None:
     if along != grid:
         return None
     number_of = {c: k for k, c in enumerate(sides)}
-    places = tuple(tuple(number_of[c] for c in place) for place in cell.nodes)
+    node_indices = tuple(tuple(number_of[c] for c in node) for node in cell.nodes)
 
     def lagrange(x: Any) -> list[Any]:
         return [
@@ -131,48 +131,50 @@ def _line(cell: Element, rule: QuadratureRule) -> Line | None:
     def slope(x: Any) -> list[Any]:
         return [(sp.diff(v, x),) for v in lagrange(x)]
 
-    values, slopes = _evaluated(lagrange, slope, [(x,) for x in along], 1)
-    return Line(values, tuple(tuple(s for (s,) in row) for row in slopes), places)
+    values, derivatives = _evaluated(lagrange, slope, [(x,) for x in along], 1)
+    return Line(values, tuple(tuple(s for (s,) in row) for row in derivatives), node_indices)
 
 
 def _products(line: Line, dimension: int) -> tuple[Any, Any]:
     """Values and slopes of the products of a line's shape functions."""
-    values, slopes = [], []
+    values, derivatives = [], []
     for point in product(range(len(line.values)), repeat=dimension):
         directions = (-1, *range(dimension))  # -1: the value
-        pairs = [(line.values[q], line.slopes[q]) for q in point]
+        pairs = [(line.values[q], line.derivatives[q]) for q in point]
         rows = [
-            [prod(pairs[k][k == by][a] for k, a in enumerate(place)) for by in directions]
-            for place in line.places
+            [prod(pairs[k][k == by][a] for k, a in enumerate(node)) for by in directions]
+            for node in line.node_indices
         ]
         values.append(tuple(row[0] for row in rows))
-        slopes.append(tuple(tuple(row[1:]) for row in rows))
-    return tuple(values), tuple(slopes)
+        derivatives.append(tuple(tuple(row[1:]) for row in rows))
+    return tuple(values), tuple(derivatives)
 
 
-def _slopes(name: str, line: Line) -> str:
+def _derivative_table(name: str, line: Line) -> str:
     """Table NAME of slopes [point][node][direction] of products, which the C compiler multiplies.
 
     For a cell of 27 nodes that is a twentieth of the text of the numbers.
     """
-    D = len(line.places[0])
+    D = len(line.node_indices[0])
     lines = []
-    for letter, rows in (("L", line.values), ("M", line.slopes)):
+    for letter, rows in (("L", line.values), ("M", line.derivatives)):
         for point, row in enumerate(rows):
             lines += [f"#define {name}_{letter}{point}{a} {number(v)}" for a, v in enumerate(row)]
     points, nodes = "ijk"[:D], "abc"[:D]
-    slopes = [
+    derivatives = [
         " * ".join(f"{name}_{'M' if k == by else 'L'}##{points[k]}##{nodes[k]}" for k in range(D))
         for by in range(D)
     ]
-    lines.append(f"#define {name}_node({', '.join(points + nodes)}) {{{', '.join(slopes)}}}")
-    given = ", ".join(points)
-    terms = [f"    {name}_node({given}, {', '.join(map(str, place))})" for place in line.places]
+    lines.append(f"#define {name}_node({', '.join(points + nodes)}) {{{', '.join(derivatives)}}}")
+    arguments = ", ".join(points)
+    terms = [
+        f"    {name}_node({arguments}, {', '.join(map(str, node))})" for node in line.node_indices
+    ]
     entries = ", \\\n".join(terms)
-    lines.append(f"#define {name}_point({given}) {{ \\\n{entries}}}")
+    lines.append(f"#define {name}_point({arguments}) {{ \\\n{entries}}}")
     every = product(range(len(line.values)), repeat=D)
     table = ",\n".join(f"{name}_point({', '.join(map(str, q))})" for q in every)
-    size = f"[{len(line.values) ** D}][{len(line.places)}][{D}]"
+    size = f"[{len(line.values) ** D}][{len(line.node_indices)}][{D}]"
     return "\n".join([*lines, f"static const double {name}{size} = {{\n{table}}};\n"])
 
 
@@ -192,7 +194,7 @@ def pairs(name: str, first: Line, second: Line) -> str:
             for p, d in zip(a, da, strict=True)
         ]
         for a, da, b, db in zip(
-            first.values, first.slopes, second.values, second.slopes, strict=True
+            first.values, first.derivatives, second.values, second.derivatives, strict=True
         )
     ]
     return _array(name, rows)
@@ -200,9 +202,9 @@ def pairs(name: str, first: Line, second: Line) -> str:
 
 def nodes(name: str, line: Line) -> str:
     """Table NAME of the node of every product of nodes along the directions."""
-    size, D = len(line.values[0]), len(line.places[0])
-    at = {place: k for k, place in enumerate(line.places)}
-    order = [at[place] for place in product(range(size), repeat=D)]
+    size, D = len(line.values[0]), len(line.node_indices[0])
+    at = {node: k for k, node in enumerate(line.node_indices)}
+    order = [at[node] for node in product(range(size), repeat=D)]
     return f"static const int {name}[{size**D}] = {{{', '.join(map(str, order))}}};\n"
 
 

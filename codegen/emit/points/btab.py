@@ -37,55 +37,57 @@ class Parent:
     @cached_property
     def moduli(self) -> dict[tuple[Quantity, Quantity], str]:
         """Moduli at the point by what they multiply, as the function gives them; both triangles."""
-        q, found = self.layout.form.own, {}
+        q, by_pair = self.layout.form.cell_quantities, {}
         for k, (i, j) in enumerate(self.outputs.moduli):
             if j not in q:
                 continue
-            found[q[i], q[j]] = f"A[{k}]"
+            by_pair[q[i], q[j]] = f"A[{k}]"
             if self.symmetric:
-                found[q[j], q[i]] = f"A[{k}]"
-        return found
+                by_pair[q[j], q[i]] = f"A[{k}]"
+        return by_pair
 
     @cached_property
     def of_centroid(self) -> list[dict[Quantity, str]]:
         """Derivatives of fluxes by each value at the centroid; empty where all are zero."""
-        q, found = self.layout.form.own, []
+        q, columns = self.layout.form.cell_quantities, []
         numbers = {value: k for k, value in enumerate(self.layout.form.unknowns)}
         for value in (self.layout.form.all[k] for k in self.layout.form.centroid):
             column = numbers.get(value)
             pairs = enumerate(self.outputs.moduli)
-            found.append({q[i]: f"A[{k}]" for k, (i, j) in pairs if j == column})
-        return found if any(found) else []
+            columns.append({q[i]: f"A[{k}]" for k, (i, j) in pairs if j == column})
+        return columns if any(columns) else []
 
     @cached_property
     def blocks(self) -> dict[tuple[Component, bool, Component, bool], list[tuple[Quantity, ...]]]:
         """Entries of the moduli by components and whether they are slopes; none is empty."""
-        found: dict[tuple[Component, bool, Component, bool], list[tuple[Quantity, ...]]] = {}
+        by_block: dict[tuple[Component, bool, Component, bool], list[tuple[Quantity, ...]]] = {}
         for row, column in self.moduli:
             key = (row.component, row.axis is not None, column.component, column.axis is not None)
-            found.setdefault(key, []).append((row, column))
-        return found
+            by_block.setdefault(key, []).append((row, column))
+        return by_block
 
     @cached_property
     def quantities(self) -> list[Quantity]:
         """Values and parent slopes of the components, in the order of the page."""
-        found: dict[Quantity, None] = {}
-        for q in self.layout.form.own.values():
+        parent_quantities: dict[Quantity, None] = {}
+        for q in self.layout.form.cell_quantities.values():
             axes = [None] if q.axis is None else range(self.layout.dimension)
-            found.update(dict.fromkeys(Quantity(q.component, k) for k in axes))
+            parent_quantities.update(dict.fromkeys(Quantity(q.component, k) for k in axes))
         order = {c: k for k, c in enumerate(self.layout.components)}
-        return sorted(found, key=lambda q: (order[q.component], -1 if q.axis is None else q.axis))
+        return sorted(
+            parent_quantities, key=lambda q: (order[q.component], -1 if q.axis is None else q.axis)
+        )
 
     @cached_property
     def numbers(self) -> dict[tuple[Quantity, Quantity], int]:
         """Place in S of what is not zero."""
-        found: dict[tuple[Quantity, Quantity], int] = {}
+        entry_numbers: dict[tuple[Quantity, Quantity], int] = {}
         for n, row in enumerate(self.quantities):
             for column in self.quantities[n if self.symmetric else 0 :]:
-                slopes = row.axis is not None, column.axis is not None
-                if (row.component, slopes[0], column.component, slopes[1]) in self.blocks:
-                    found[row, column] = len(found)
-        return found
+                is_gradient = row.axis is not None, column.axis is not None
+                if (row.component, is_gradient[0], column.component, is_gradient[1]) in self.blocks:
+                    entry_numbers[row, column] = len(entry_numbers)
+        return entry_numbers
 
     @property
     def size(self) -> int:
@@ -160,8 +162,8 @@ class Pair:
 
     def components(self, side: int) -> list[Component]:
         """Of the rows (0) or columns (1)."""
-        found = dict.fromkeys(q.component for q in self.parent.quantities)
-        return [c for c in found if c.order == self.order[side]]
+        distinct = dict.fromkeys(q.component for q in self.parent.quantities)
+        return [c for c in distinct if c.order == self.order[side]]
 
     @cached_property
     def entries(self) -> list[tuple[Component, Component]]:
@@ -173,7 +175,7 @@ class Pair:
     def store(self, out: Lines, i: Component, j: Component, a: str, b: str, value: str) -> None:
         """Write an entry of the tangent; of a symmetric one that above the diagonal."""
         size = len(self.layout.d.unknowns)
-        row, column = self.layout.place(i).at(a), self.layout.place(j).at(b)
+        row, column = self.layout.entries(i).at(a), self.layout.entries(j).at(b)
         if self.parent.symmetric and self.layout.field(i) > self.layout.field(j):
             row, column = column, row
         out.add(f"k_lanes[({row}) * {size} + {column}] = {value};")
@@ -182,13 +184,13 @@ class Pair:
 def ranks(layout: Layout) -> list[tuple[Any, ...]]:
     """Ranks of the unknowns: of two mirrored entries that with the row of lower rank is kept."""
     names = {c.name: c for c in layout.components}
-    found = []
-    for n, (name, node) in enumerate(layout.d.places):
+    ranked = []
+    for n, (name, node) in enumerate(layout.d.dof_nodes):
         c = names[name]
         line = layout.shape(c.order).line
-        along = line.places[node or 0][::-1] if line is not None else (node,)
-        found.append((layout.field(c), along, n))
-    return found
+        along = line.node_indices[node or 0][::-1] if line is not None else (node,)
+        ranked.append((layout.field(c), along, n))
+    return ranked
 
 
 Columns = dict[tuple[Quantity, Component], int]
@@ -239,9 +241,9 @@ def _columns(out: Lines, pair: Pair, columns: Columns) -> None:
     for (q, j), n in columns.items():
         terms = []
         for o in pair.parent.of(j):
-            place = pair.parent.number(q, o)
-            if place is not None:
-                terms.append(f"S[q][{place}] * {_factor(o, 'b')}")
+            entry = pair.parent.number(q, o)
+            if entry is not None:
+                terms.append(f"S[q][{entry}] * {_factor(o, 'b')}")
         out.add(f"C[q][{n}] = {' + '.join(terms)};")
     out.close()
 

@@ -48,12 +48,12 @@ def store(out: Lines, to: str, source: str, count: int, width: str) -> None:
 
 def _moved(out: Lines, count: int, value: Callable[[str], str], call: str) -> None:
     """Calls for four neighbours each, and for those that are left."""
-    whole = count - count % 4 if count > LONG else 0
-    if whole:
-        out.open(f"for (ptrdiff_t k = 0; k < {whole}; k += 4)")
+    in_groups = count - count % 4 if count > LONG else 0
+    if in_groups:
+        out.open(f"for (ptrdiff_t k = 0; k < {in_groups}; k += 4)")
         out.add(f"{call.format(4, 'k')}{', '.join(value(f'k + {i}') for i in range(4))});")
         out.close()
-    for k in range(whole, count, 4):
+    for k in range(in_groups, count, 4):
         size = min(4, count - k)
         values = ", ".join(value(str(k + i)) for i in range(size))
         out.add(f"{call.format(size, k)}{values});")

@@ -14,16 +14,16 @@ def used(layout: Layout, text: str, prefix: str = "") -> list[str]:
     """The tables of the cell that a text names."""
     name, form = prefix + layout.tables, layout.form
     every = [*form.all, *form.data.values()]
-    found = {**{o: layout.shape(o) for o in orders(every)}, layout.geometry.order: layout.geometry}
+    shapes = {**{o: layout.shape(o) for o in orders(every)}, layout.geometry.order: layout.geometry}
     texts: dict[str, Callable[[], str]] = {}
     texts[f"{name}_W"] = partial(basis_tables.weights, name, layout.d.rule)
-    for shape in found.values():
+    for shape in shapes.values():
         texts |= shape.texts(name)
         if shape.line is not None:
             label = f"{name}_nodes{shape.order}"
             texts[label] = partial(basis_tables.nodes, label, shape.line)
-    for a in found.values():
-        for b in found.values():
+    for a in shapes.values():
+        for b in shapes.values():
             if a.line is not None and b.line is not None:
                 label = f"{name}_C{a.order}{b.order}"
                 texts[label] = partial(basis_tables.pairs, label, a.line, b.line)

@@ -19,7 +19,7 @@ class Frame:
     """The function of a group of elements while it is written.
 
     Arrays of the element: places xs, unknowns us, data es, variation ts, forces r. D: dimension.
-    ring: whether the volume is that of a ring. design: whether places move. spread: whether
+    ring: whether the volume is that of a ring. design: whether places move. to_unknowns: whether
     fluxes go to nodes. first_dof: unknowns in a variation come after so many entries.
     """
 
@@ -31,7 +31,7 @@ class Frame:
         self.widths = widths(layout.d, task)
         self.ring = layout.form.axisymmetric
         self.design = task in abi.DESIGN
-        self.spread = point_function.used(task)
+        self.to_unknowns = point_function.used(task)
         self.first_dof = design_width(layout.d)
 
     def moving(self) -> int:
@@ -61,15 +61,15 @@ class Frame:
             out.add(f"{k} += {named[v]} * {f};")
         out.close()
 
-    def factors(self, order: int, wanted: Iterable[str], node: str) -> None:
+    def factors(self, order: int, letters: Iterable[str], node: str) -> None:
         """Shape functions N and slopes D0, D1, D2 of a node at the point q."""
         name = self.layout.tables
         if self.layout.shape(order).long:
-            for f in sorted(wanted):
+            for f in sorted(letters):
                 table = f"N{order}[{node}]" if f == "N" else f"D{order}[{node}][{f[1:]}]"
                 self.out.add(f"const double {f} = {table};")
             return
-        for f in sorted(wanted):
+        for f in sorted(letters):
             entry = "" if f == "N" else f"[{f[1:]}]"
             table = "N" if f == "N" else "D"
             self.out.add(f"const double {f} = {name}_{table}{order}[q][{node}]{entry};")
@@ -86,9 +86,9 @@ def products(f: Frame) -> None:
         out.open(f"for (int n = 0; n < {nodes}; ++n)")
         out.add(f"const int *const at = {name}_along{order}[n];")
         for k in range(D):
-            place = f"q / {points ** (D - 1 - k)} % {points}"
-            out.add(f"const double l{k} = {name}_L{order}[{place}][at[{k}]];")
-            out.add(f"const double m{k} = {name}_M{order}[{place}][at[{k}]];")
+            index = f"q / {points ** (D - 1 - k)} % {points}"
+            out.add(f"const double l{k} = {name}_L{order}[{index}][at[{k}]];")
+            out.add(f"const double m{k} = {name}_M{order}[{index}][at[{k}]];")
         out.add(f"N{order}[n] = {' * '.join(f'l{k}' for k in range(D))};")
         for by in range(D):
             terms = " * ".join(f"{'m' if k == by else 'l'}{k}" for k in range(D))
@@ -106,22 +106,22 @@ def to_nodes(f: Frame, fluxes: dict[Quantity, str], to: str, weight: str) -> Non
     """Fluxes at the point q, pulled back to the parent cell, times their weight added at nodes."""
     out = f.out
     for order in orders(list(fluxes)):
-        here = {q: v for q, v in fluxes.items() if q.component.order == order}
+        of_order = {q: v for q, v in fluxes.items() if q.component.order == order}
         terms: dict[Component, list[str]] = {}
-        for n, c in enumerate(components(here)):
-            slopes = {q.axis: v for q, v in here.items() if q.component == c}
-            value = slopes.pop(None, None)
+        for n, c in enumerate(components(of_order)):
+            of_component = {q.axis: v for q, v in of_order.items() if q.component == c}
+            value = of_component.pop(None, None)
             terms[c] = []
             if value is not None:
                 out.add(f"const V f{order}{n} = {weight}{value};")
                 terms[c].append(f"f{order}{n} * N")
-            for m in range(f.D if slopes else 0):
-                total = " + ".join(f"{v} * I{m}{axis}" for axis, v in slopes.items())
+            for m in range(f.D if of_component else 0):
+                total = " + ".join(f"{v} * I{m}{axis}" for axis, v in of_component.items())
                 out.add(f"const V f{order}{n}{m} = {weight}({total});")
                 terms[c].append(f"f{order}{n}{m} * D{m}")
         out.open(f"for (int n = 0; n < {f.layout.shape(order).nodes}; ++n)")
         factors = {t.rpartition(" ")[2] for some in terms.values() for t in some}
         f.factors(order, factors, "n")
         for c, some in terms.items():
-            out.add(f"{to}[{f.layout.place(c).at('n')}] += {' + '.join(some)};")
+            out.add(f"{to}[{f.layout.entries(c).at('n')}] += {' + '.join(some)};")
         out.close()

@@ -21,7 +21,7 @@ def write(f: Frame) -> None:
     out.idle(*named)
     if f.design:
         _moved(f)
-    if f.spread or f.task == Task.ENERGY:
+    if f.to_unknowns or f.task == Task.ENERGY:
         ring = " * (6.283185307179586 * X1)" if f.ring else ""
         out.add(f"const V w = det * {f.layout.tables}_W[q]{ring};")
 

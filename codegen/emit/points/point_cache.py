@@ -31,11 +31,11 @@ class Kept:
     def names(self) -> list[str]:
         """Variables of C that are kept at a point."""
         D, needs = range(self.layout.dimension), self.frame.needs
-        found = [f"I{k}{m}" for k in D for m in D] + ["w"]
+        cached = [f"I{k}{m}" for k in D for m in D] + ["w"]
         for array, letter in point_function.ARRAYS.items():
             if array != "direction":
-                found += [f"{letter}[{k}]" for k in needs[array]]
-        return found
+                cached += [f"{letter}[{k}]" for k in needs[array]]
+        return cached
 
     def text(self) -> str:
         """The task in C: a function for one group of lanes, and one over all groups."""
@@ -65,7 +65,7 @@ class Kept:
         name, body = abi.function_name(d.name, "keep"), "\n".join(out.lines)
         moved = {"X": f.widths["coordinates"], "d": f.widths["dofs"], "a": f.widths["data"]}
         arrays = {"X": "coordinates", "d": "dofs", "a": "data"}
-        given = [f"{arrays[k]} + {w} * e" if w != "0" else "0" for k, w in moved.items()]
+        arguments = [f"{arrays[k]} + {w} * e" if w != "0" else "0" for k, w in moved.items()]
         return (
             f"static void {name}_group(const double *restrict X, const double *restrict d,\n"
             "    const double *restrict a, const double *restrict parameters, double *restrict R)\n"
@@ -74,6 +74,6 @@ class Kept:
             "    (void)points, (void)modes, (void)data, (void)direction, (void)rule, (void)basis;\n"
             "    (void)tangent;\n"
             "    for (ptrdiff_t e = 0; e < n; e += SOFTEHL_LANES)\n"
-            f"        {name}_group({', '.join(given)}, parameters, values + {count * points} * e);"
-            "\n}\n"
+            f"        {name}_group({', '.join(arguments)}, "
+            f"parameters, values + {count * points} * e);\n}}\n"
         )

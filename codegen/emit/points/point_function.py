@@ -37,8 +37,8 @@ class PointOutputs:
         if not self.square:
             return False
         pairs = ((x.row, x.column, x.node) for x in self.entries if x.column is not None)
-        found = {(i.position, j.position): n for i, j, n in pairs}
-        return all(found.get((j, i)) is n for (i, j), n in found.items())
+        nodes = {(i.position, j.position): n for i, j, n in pairs}
+        return all(nodes.get((j, i)) is n for (i, j), n in nodes.items())
 
     @property
     def rows(self) -> list[Entry]:
@@ -53,13 +53,13 @@ class PointOutputs:
     @property
     def moduli(self) -> dict[tuple[int, int], Node]:
         """Moduli by row and column, in the order of A."""
-        found = {}
+        numbers = {}
         for x in self.entries:
             if x.column is not None and not _is_zero(x.node):
                 i, j = x.row.position, x.column.position
                 if i <= j or not self.symmetric:
-                    found[i, j] = x.node
-        return found
+                    numbers[i, j] = x.node
+        return numbers
 
     def targets(self) -> list[tuple[str, Node]]:
         """Every output with the variable that takes it."""
@@ -91,7 +91,7 @@ def text(layout: Layout, task: str, outputs: PointOutputs, plan: Schedule) -> tu
             p.line(1, f"const V {_NAMES[array]}{k} = {argument}[{k}];")
     written = [n for _, n in outputs.targets()]
     p.read(plan, written, written)
-    _statements(p, outputs.targets(), [s for stage in plan.stages for s in stage.before])
+    _statements(p, outputs.targets(), [s for stage in plan.stages for s in stage.preamble])
     p.line(1, "return failed;")
     arguments = ", ".join(f"const V *restrict {a}" for a in ARRAYS.values())
     head = (

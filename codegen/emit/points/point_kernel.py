@@ -46,7 +46,7 @@ class Centroid(Frame):
 
     def write(self, out: Lines) -> None:
         """Values c, along a direction their rates dc, for a tangent their derivatives G."""
-        self.out, self.spread = out, False
+        self.out, self.to_unknowns = out, False
         layout, outputs, form = self.layout, self.outputs, self.layout.form
         count, rates = len(form.centroid), len(outputs.rates)
         out.add(f"V c[{count}];")
@@ -66,9 +66,11 @@ class Centroid(Frame):
             out.add(f"for (int k = 0; k < {rates}; ++k) dc[k] = A[k];")
         for k in range(count if self.task == Task.TANGENT else 0):
             pairs = enumerate(outputs.moduli)
-            slopes: dict[Quantity, str] = {form.all[j]: f"A[{n}]" for n, (i, j) in pairs if i == k}
+            gradients: dict[Quantity, str] = {
+                form.all[j]: f"A[{n}]" for n, (i, j) in pairs if i == k
+            }
             out.open("")
-            to_nodes(self, slopes, f"G[{k}]", "")
+            to_nodes(self, gradients, f"G[{k}]", "")
             out.close()
         out.close()
 
@@ -130,7 +132,7 @@ class Group(Frame):
                 load(out, array, source, count, width)
                 out.idle(array)
         out.add("M failed = softehl_mask(0);")
-        if self.spread:
+        if self.to_unknowns:
             out.add(f"V r[{len(d.unknowns)}];")
             out.add(f"for (int k = 0; k < {len(d.unknowns)}; ++k) r[k] = softehl_splat(0.0);")
         if self.task == Task.ENERGY:
@@ -164,31 +166,34 @@ class Group(Frame):
                 out.close()
 
     def _plain_fluxes(self) -> dict[Quantity, str]:
-        return {q: f"P[{k}]" for k, q in self.layout.form.own.items()}
+        return {q: f"P[{k}]" for k, q in self.layout.form.cell_quantities.items()}
 
     def _moved_fluxes(self) -> dict[Quantity, str]:
         """Rates of fluxes with what the moving places add."""
-        numbers = {q: k for k, q in self.layout.form.own.items()}
-        found: dict[Quantity, str] = {}
+        numbers = {q: k for k, q in self.layout.form.cell_quantities.items()}
+        fluxes: dict[Quantity, str] = {}
         for c in components(numbers):
-            mine = {q.axis: k for q, k in numbers.items() if q.component == c}
-            slopes = {axis: k for axis, k in mine.items() if axis is not None}
-            for axis in [*([None] if None in mine else []), *(range(self.D) if slopes else [])]:
+            by_axis = {q.axis: k for q, k in numbers.items() if q.component == c}
+            gradients = {axis: k for axis, k in by_axis.items() if axis is not None}
+            for axis in [
+                *([None] if None in by_axis else []),
+                *(range(self.D) if gradients else []),
+            ]:
                 terms = []
-                if axis in mine:
-                    terms.append(f"A[{mine[axis]}] + swell * P[{mine[axis]}]")
+                if axis in by_axis:
+                    terms.append(f"A[{by_axis[axis]}] + swell * P[{by_axis[axis]}]")
                 if axis is not None:
-                    terms += [f"(-P[{k}]) * L{axis}{m}" for m, k in slopes.items()]
-                name = f"moved{len(found)}"
+                    terms += [f"(-P[{k}]) * L{axis}{m}" for m, k in gradients.items()]
+                name = f"moved{len(fluxes)}"
                 self.out.add(f"const V {name} = {' + '.join(terms)};")
-                found[Quantity(c, axis)] = name
-        return found
+                fluxes[Quantity(c, axis)] = name
+        return fluxes
 
     def _finish(self) -> None:
         out, d = self.out, self.layout.d
         size = len(d.unknowns)
-        if self.spread or self.task == Task.ENERGY:
-            count = size if self.spread else 1
+        if self.to_unknowns or self.task == Task.ENERGY:
+            count = size if self.to_unknowns else 1
             store(out, "R", "r", count, str(count))
         out.open("if (softehl_any(failed))")
         out.add(f"softehl_spoil(failed, R, {self.widths['values']});")
@@ -229,12 +234,12 @@ def declaration(name: str, layout: Layout, outputs: PointOutputs) -> str:
 def _body(layout: Layout, outputs: PointOutputs) -> str:
     out, parent = Lines(), Parent(layout, outputs)
     count = len(layout.d.unknowns) ** 2
-    kept = "static _Thread_local " if count > _SHORT else ""  # a stack has no room for it
-    out.add(f"{kept}V k_lanes[{count}];")
-    found = orders(parent.quantities)
+    storage = "static _Thread_local " if count > _SHORT else ""  # a stack has no room for it
+    out.add(f"{storage}V k_lanes[{count}];")
+    needed_orders = orders(parent.quantities)
     pairs = []
-    for n, e in enumerate(found):
-        for f in found[n if parent.symmetric else 0 :]:
+    for n, e in enumerate(needed_orders):
+        for f in needed_orders[n if parent.symmetric else 0 :]:
             pairs.append(Pair(parent, (e, f), e == f and parent.symmetric))
     covered = {entry for pair in pairs for entry in pair.entries}
     if parent.symmetric:
@@ -258,21 +263,21 @@ def _body(layout: Layout, outputs: PointOutputs) -> str:
 
 
 def _store(out: Lines, layout: Layout, count: int, *, symmetric: bool) -> None:
-    whole, name = count - count % 4, f"{STEM}{layout.d.cell}_K"
+    in_groups, name = count - count % 4, f"{STEM}{layout.d.cell}_K"
     if count > _SHORT:
         _store_by_ranks(out, layout, symmetric=symmetric)
         return
-    _places(out, layout, name, symmetric=symmetric)
-    out.open(f"for (ptrdiff_t k = 0; k < {whole}; k += 4)")
+    _entry_table(out, layout, name, symmetric=symmetric)
+    out.open(f"for (ptrdiff_t k = 0; k < {in_groups}; k += 4)")
     out.add(f"const unsigned short *const at = {name} + k;")
     values = ", ".join(f"k_lanes[at[{i}]]" for i in range(4))
     out.add(f"softehl_store4(K + k, {count}, {values});")
     out.close()
-    for k in range(whole, count):
+    for k in range(in_groups, count):
         out.add(f"softehl_store1(K + {k}, {count}, k_lanes[{name}[{k}]]);")
 
 
-def _places(out: Lines, layout: Layout, name: str, *, symmetric: bool) -> None:
+def _entry_table(out: Lines, layout: Layout, name: str, *, symmetric: bool) -> None:
     """Table of the place in k_lanes of every entry, row by row.
 
     Of a symmetric tangent that of the two mirrored entries which is computed; the C compiler
@@ -332,8 +337,8 @@ def kernel(layout: Layout, task: str, point: At, centroid: At | None) -> KernelT
     text, temporaries = point_function.text(layout, task, point.outputs, point.plan)
     pieces, name, shared = [text], "", None
     if centroid is not None:
-        there = layout.at_centroid()
-        pieces.append(point_function.text(there, task, centroid.outputs, centroid.plan)[0])
+        centre = layout.at_centroid()
+        pieces.append(point_function.text(centre, task, centroid.outputs, centroid.plan)[0])
     if task == Task.TANGENT:
         name, text = file(layout, point.outputs)
         shared = (f"{name.removeprefix('softehl_')}.c", text)
@@ -370,23 +375,23 @@ def choose(layout: Layout, tangent: PointOutputs, operations: int, short: int) -
     if d.unroll is not None:
         return Choice(d.unroll is False, "the page asks for it")
     work = layout.points * (2 * multiply_adds(layout, tangent) + operations)
-    whole = round((1 - SAVED) * work)
-    told = f"about {whole} operations of the whole element"
+    element_operations = round((1 - SAVED) * work)
+    estimate = f"about {element_operations} operations of the whole element"
     if any(n.op is Op.CALL for n in reachable([x.node for x in tangent.entries])):
-        return Choice(True, f"local unknowns or functions of stretches, {told}")
+        return Choice(True, f"local unknowns or functions of stretches, {estimate}")
     if d.history and layout.points > 1:
-        return Choice(True, f"history at {layout.points} points, {told}")
+        return Choice(True, f"history at {layout.points} points, {estimate}")
     simple = d.cell.startswith(("tri", "tet", "wedge", "pyramid"))
     limit = LARGE if simple and not d.history else short
-    return Choice(whole > limit, f"{told}, limit {limit}")
+    return Choice(element_operations > limit, f"{estimate}, limit {limit}")
 
 
 def multiply_adds(layout: Layout, tangent: PointOutputs) -> int:
     """Multiply-adds of B^T S B at one point, pair by pair of nodes."""
     parent = Parent(layout, tangent)
-    total, found = 0, orders(parent.quantities)
-    for n, e in enumerate(found):
-        for f in found[n if parent.symmetric else 0 :]:
+    total, needed_orders = 0, orders(parent.quantities)
+    for n, e in enumerate(needed_orders):
+        for f in needed_orders[n if parent.symmetric else 0 :]:
             pair = Pair(parent, (e, f), e == f and parent.symmetric)
             rows, columns = layout.shape(e).nodes, layout.shape(f).nodes
             pairs = rows * (rows + 1) // 2 if pair.half else rows * columns

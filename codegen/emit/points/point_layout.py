@@ -78,24 +78,26 @@ class Layout:
         some = [q for k, q in enumerate(self.form.all) if k not in self.form.centroid]
         return list(dict.fromkeys(q.component for q in some))
 
-    def place(self, c: Component) -> StridedEntries:
+    def entries(self, c: Component) -> StridedEntries:
         """Place of a component among the unknowns, or the data, of the element."""
-        if c.given:
+        if c.is_data:
             names = [a.name for a in self.d.data]
             numbers = [names.index(f"{c.name}{a + 1}") for a in range(self.shape(c.order).nodes)]
         else:
-            numbers = [k for k, (name, _) in enumerate(self.d.places) if name == c.name]
+            numbers = [k for k, (name, _) in enumerate(self.d.dof_nodes) if name == c.name]
         stride = numbers[1] - numbers[0] if len(numbers) > 1 else 1
         assert all(n == numbers[0] + stride * a for a, n in enumerate(numbers))
         return StridedEntries(numbers[0], stride)
 
     def field(self, c: Component) -> int:
         """Unknowns before those of the field that a component belongs to."""
-        place = self.place(c)
+        entries = self.entries(c)
         inside = [
-            self.place(o).start for o in self.components if self.place(o).stride == place.stride
+            self.entries(o).start
+            for o in self.components
+            if self.entries(o).stride == entries.stride
         ]
-        return min(s for s in inside if place.start - s in range(place.stride))
+        return min(s for s in inside if entries.start - s in range(entries.stride))
 
     def shape(self, order: int) -> Shape:
         """Shape functions of an order."""
@@ -111,8 +113,8 @@ class Layout:
     def long_orders(self) -> list[int]:
         """Orders of shape functions whose tables are long."""
         every = [*self.form.all, *self.form.data.values()]
-        found = {self.geometry.order, *orders(every)}
-        return sorted(order for order in found if self.shape(order).long)
+        used_orders = {self.geometry.order, *orders(every)}
+        return sorted(order for order in used_orders if self.shape(order).long)
 
     @cached_property
     def _shapes(self) -> dict[int, Shape]:
@@ -133,11 +135,11 @@ class Needs:
     @staticmethod
     def of(entries: Iterable[Entry]) -> Needs:
         """Inputs of some outputs."""
-        found: dict[str, set[int]] = {}
+        numbers: dict[str, set[int]] = {}
         for n in reachable([x.node for x in entries]):
             if isinstance(n.payload, Input):
-                found.setdefault(n.payload.array, set()).add(n.payload.index)
-        return Needs({array: tuple(sorted(some)) for array, some in found.items()})
+                numbers.setdefault(n.payload.array, set()).add(n.payload.index)
+        return Needs({array: tuple(sorted(some)) for array, some in numbers.items()})
 
     def __getitem__(self, array: str) -> tuple[int, ...]:
         return self.arrays.get(array, ())

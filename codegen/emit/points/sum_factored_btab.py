@@ -20,12 +20,12 @@ Key = tuple[Component, int | None, Component, int | None]
 
 def assembled(out: Lines, pair: Pair) -> None:
     """The loops over pairs of nodes along the directions, the last one outermost."""
-    found: dict[Key, str] = {}
+    values: dict[Key, str] = {}
     for row, column in _both(pair):
         n = pair.parent.number(row, column)
         if n is not None:
-            found[row.component, row.axis, column.component, column.axis] = str(n)
-    _Level(out, pair, pair.layout.dimension - 1, "S").write(found, alike=pair.half)
+            values[row.component, row.axis, column.component, column.axis] = str(n)
+    _Level(out, pair, pair.layout.dimension - 1, "S").write(values, alike=pair.half)
 
 
 def _both(pair: Pair) -> list[tuple[Quantity, Quantity]]:
@@ -46,8 +46,8 @@ class _Level:
     @property
     def lines(self) -> list[Line]:
         """Shape functions along a direction, of rows and of columns."""
-        found = [self.pair.layout.shape(order).line for order in self.pair.order]
-        return [line for line in found if line is not None]
+        order_lines = [self.pair.layout.shape(order).line for order in self.pair.order]
+        return [line for line in order_lines if line is not None]
 
     def write(self, moduli: dict[Key, str], *, alike: bool) -> None:
         """Loops over pairs of nodes along the axis; moduli: places in the source.
@@ -72,9 +72,9 @@ class _Level:
         """The sums of one pair of nodes along the axis."""
         out, axis, size = self.out, self.axis, len(self.lines[0].values)
         targets: dict[Key, list[tuple[int, str]]] = {}
-        for (i, k, j, m), place in moduli.items():
-            kept = (i, None if k == axis else k, j, None if m == axis else m)
-            targets.setdefault(kept, []).append((2 * (k == axis) + (m == axis), place))
+        for (i, k, j, m), entry in moduli.items():
+            reduced = (i, None if k == axis else k, j, None if m == axis else m)
+            targets.setdefault(reduced, []).append((2 * (k == axis) + (m == axis), entry))
         mirrored = {(i, k, j, m): (j, m, i, k) for i, k, j, m in targets}
         if alike:
             turn = {key: n for n, key in enumerate(targets)}

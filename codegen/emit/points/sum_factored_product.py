@@ -153,16 +153,16 @@ class Factored:
     outputs: PointOutputs
     plan: Schedule
 
-    def text(self, before: list[str]) -> str:
-        """C file. before: routines that the function of the point calls."""
+    def text(self, preamble: list[str]) -> str:
+        """C file. preamble: routines that the function of the point calls."""
         point, _ = point_function.text(self.layout, Task.PRODUCT, self.outputs, self.plan)
-        keep, action = self.kept.text(), self._action()
+        keep, action = self.cache.text(), self._action()
         tables = cell_constants.used(self.layout, keep)
         pieces = [self._tables_of_lines(), point, keep, action]
-        return c_source.source(self.layout.d, pieces, [*before, SUPPORT, *tables])
+        return c_source.source(self.layout.d, pieces, [*preamble, SUPPORT, *tables])
 
     @cached_property
-    def kept(self) -> Kept:
+    def cache(self) -> Kept:
         """The variables that a product needs at a point."""
         return Kept(self.layout, self.outputs)
 
@@ -181,7 +181,7 @@ class Factored:
         rule, D = self.layout.d.rule, self.layout.dimension
         n, count = self._sizes
         at = [float(p[-1]) for p in rule.points[:count]]
-        cell = sorted({float(place[0]) for place in ELEMENTS[self.layout.d.cell].nodes})
+        cell = sorted({float(node[0]) for node in ELEMENTS[self.layout.d.cell].nodes})
         assert len(cell) == n
         assert len(rule.points) == count**D
         to, slope = lagrange(cell, at)[0], lagrange(at, at)[1]
@@ -220,7 +220,7 @@ class Factored:
         for line in scatter(C, n**D):
             out.add(line)
         name, body = abi.function_name(d.name, "action"), "\n".join(out.lines)
-        step = len(self.kept.names) * q**D
+        step = len(self.cache.names) * q**D
         arguments = (
             "ptrdiff_t first, ptrdiff_t last, const double *restrict parameters,\n"
             "    const double *restrict kept, const int *restrict index, const double *restrict x,"
@@ -287,21 +287,21 @@ class Factored:
 
     def _points(self, out: Lines, points: int) -> None:
         """Fluxes at every point, in the places of the slopes."""
-        layout, D, count = self.layout, self.layout.dimension, len(self.kept.names)
-        f = self.kept.frame
+        layout, D, count = self.layout, self.layout.dimension, len(self.cache.names)
+        f = self.cache.frame
         out.open(f"for (int q = 0; q < {points}; ++q)")
         out.add(f"const softehl_wide *const from = kept + {count} * q;")
         out.add(f"for (int k = 0; k < {count}; ++k)")
         out.add(f"    __builtin_prefetch(from + {count * points} + k);")
         # the rule has its first direction outermost, arrays have it innermost
-        out.add(f"const int p = {self._place()};")
+        out.add(f"const int p = {self._position()};")
         sizes = {"X": D, "g": len(layout.form.all), "e": len(layout.site.data)}
         sizes["b"] = len(layout.d.point_data)
         sizes["t"] = 1 + max([*f.needs["direction"], 0])
         sizes["P"], sizes["A"] = max(len(self.outputs.rows), 1), 1
         for letter, size in sizes.items():
             out.add(f"V {letter}[{max(size, 1)}];")
-        for k, value in enumerate(self.kept.names):
+        for k, value in enumerate(self.cache.names):
             value = value.replace("x[", "X[")  # x is the vector here
             kind = "" if "[" in value else "const V "
             out.add(f"{kind}{value} = from[{k}];")
@@ -317,21 +317,21 @@ class Factored:
         self._fluxes(out, number, D)
         out.close()
 
-    def _place(self) -> str:
+    def _position(self) -> str:
         D, q = self.layout.dimension, self._sizes[1]
         terms = [f"q / {q ** (D - 1 - k)} % {q} * {q**k}" for k in range(D)]
         return " + ".join(terms)
 
     def _fluxes(self, out: Lines, number: dict[Component, int], D: int) -> None:
-        places = {quantity: f"P[{k}]" for k, quantity in enumerate(self.layout.form.unknowns)}
-        met = components(places)
+        entries = {quantity: f"P[{k}]" for k, quantity in enumerate(self.layout.form.unknowns)}
+        met = components(entries)
         for c, k in number.items():
-            value = places.get(Quantity(c, None))
+            value = entries.get(Quantity(c, None))
             if self._of_values:
                 out.add(f"u[{k}][p] = {f'w * {value}' if value else 'softehl_splat(0.0)'};")
-            slopes = {q.axis: v for q, v in places.items() if q.component == c}
-            slopes.pop(None, None)
+            gradients = {q.axis: v for q, v in entries.items() if q.component == c}
+            gradients.pop(None, None)
             for m in range(D):
-                total = " + ".join(f"{v} * I{m}{axis}" for axis, v in slopes.items())
-                text = f"w * ({total})" if slopes and c in met else "softehl_splat(0.0)"
+                total = " + ".join(f"{v} * I{m}{axis}" for axis, v in gradients.items())
+                text = f"w * ({total})" if gradients and c in met else "softehl_splat(0.0)"
                 out.add(f"slopes[{k}][{m}][p] = {text};")

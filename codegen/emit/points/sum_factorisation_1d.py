@@ -62,10 +62,10 @@ def sweep(name: str, table: Table, kind: str) -> str:
 def _read(columns: int, lines: list[str]) -> list[str]:
     """Lines that read the values, and the sums and differences that `lines` need."""
     used = set(re.findall(r"\b[eo]\d+\b", "\n".join(lines)))
-    found = [f"    const V a{k} = a[{k} * step];" for k in range(columns)]
+    loads = [f"    const V a{k} = a[{k} * step];" for k in range(columns)]
     for i in range(columns // 2):
         j = columns - 1 - i
-        found += [
+        loads += [
             f"    const V {letter}{i} = a{i} {sign} a{j};"
             for letter, sign in (("e", "+"), ("o", "-"))
             if f"{letter}{i}" in used
@@ -73,8 +73,8 @@ def _read(columns: int, lines: list[str]) -> list[str]:
     middle = columns // 2
     if columns % 2:
         read = f"const V e{middle} = a{middle};"
-        found.append(f"    {read if f'e{middle}' in used else f'(void)a{middle};'}")
-    return found
+        loads.append(f"    {read if f'e{middle}' in used else f'(void)a{middle};'}")
+    return loads
 
 
 def _sum(letter: str, factors: list[float]) -> str:
@@ -87,11 +87,13 @@ def lagrange(
     nodes: list[float], at: list[float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Values and slopes (points, nodes) of Lagrange's polynomials."""
-    values, slopes = np.ones((len(at), len(nodes))), np.zeros((len(at), len(nodes)))
+    values, derivatives = np.ones((len(at), len(nodes))), np.zeros((len(at), len(nodes)))
     for a, x in enumerate(nodes):
         others = [b for b in nodes if b != x]
         scale = float(np.prod([x - b for b in others]))
         for k, p in enumerate(at):
             values[k, a] = np.prod([p - b for b in others]) / scale
-            slopes[k, a] = sum(np.prod([p - b for b in others if b != c]) for c in others) / scale
-    return values, slopes
+            derivatives[k, a] = (
+                sum(np.prod([p - b for b in others if b != c]) for c in others) / scale
+            )
+    return values, derivatives

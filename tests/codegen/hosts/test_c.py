@@ -10,7 +10,12 @@ import pytest
 from hypothesis import given
 
 from softehl.codegen import pipeline
-from softehl.codegen.hosts.element_interface import Before, ElementInterface, Given, Timed
+from softehl.codegen.hosts.element_interface import (
+    ElementInterface,
+    PreviousValue,
+    TimeStepValue,
+    UserInput,
+)
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import cli
 from tests.codegen import field_pages
@@ -85,9 +90,9 @@ def test_random_pages_give_what_their_python_kernels_give(
 
 def test_who_fills_the_arguments_of_a_page() -> None:
     seen = ElementInterface.of(simple(), "c")
-    assert seen.parameters == [Given(0)]
-    assert seen.data == [Given(1), *(Before(k, rate=False) for k in range(4))]
-    assert [a.name for a in seen.given] == ["k", "c"]
+    assert seen.parameters == [UserInput(0)]
+    assert seen.data == [UserInput(1), *(PreviousValue(k, rate=False) for k in range(4))]
+    assert [a.name for a in seen.inputs] == ["k", "c"]
     assert seen.by_node() == [0, 4, 1, 5, 2, 6, 3]
     assert seen.renewed == [1]
     assert not seen.symmetric
@@ -100,8 +105,8 @@ def test_rates_come_from_the_step_in_time() -> None:
 
     (heat,) = model_loader.definitions(HEAT)
     seen = ElementInterface.of(heat, "c")
-    assert seen.parameters == [Given(0), Given(1), Timed("rate")]
-    assert seen.data == [Before(0, rate=True), Before(1, rate=True)]
+    assert seen.parameters == [UserInput(0), UserInput(1), TimeStepValue("rate")]
+    assert seen.data == [PreviousValue(0, rate=True), PreviousValue(1, rate=True)]
 
 
 def test_a_folder_of_somebody_else_stays(
