@@ -35,7 +35,7 @@ def _jobs(words: str) -> Callable[[_Command], _Command]:
 
 
 @click.command(
-    help=f"""Run CASE, a TOML file or the name of a case that ships ({_NAMES}).
+    help=f"""Run CASE: a TOML file, a case that ships ({_NAMES}) or MODULE:ATTRIBUTE.
 
     A seal sits in the housing and slides on a rod (rod = "36 f7"), or in a piston and slides on a
     bore (bore = "40 H8").
@@ -320,7 +320,7 @@ def _by_petsc(case: str) -> str:
 
 
 @click.command(
-    help=f"""List the keys of CASE, a TOML file or one of {_NAMES}: default, unit, bounds, meaning.
+    help="""List the keys of CASE (as in `softehl run`): default, unit, bounds, meaning.
 
     A key is set by `softehl run CASE --set KEY=VALUE` or in a TOML file.
     """

@@ -5,12 +5,15 @@ fits a case whose rows follow the values of one key, a list.
 """
 
 import importlib
+import re
+import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
+from softehl.cases.harness.errors import BadInput, one_line
 from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.parameters import Parameters
 from softehl.cases.harness.row import Record, Row
@@ -33,7 +36,8 @@ class Case(Generic[P, R]):
     resumed run may change.  ways: keys that choose a way to the same rows.  files: patterns of the
     files that it writes beside those of its rows.  shared: name of the folder in which the runs of
     a sweep leave something for each other, empty for none.  left_out: what its model leaves out, in
-    words for a report.
+    words for a report.  source: "module:attribute" of a case that does not ship, set when it is
+    loaded.
     """
 
     name: str
@@ -46,6 +50,12 @@ class Case(Generic[P, R]):
     files: tuple[str, ...] = ()
     shared: str = ""
     left_out: tuple[str, ...] = ()
+    source: str = ""
+
+    @property
+    def reference(self) -> str:
+        """Name by which the case is found again: of one that ships, else its source."""
+        return self.source or self.name
 
     def solve(self, parameters: P, observer: Observer, shared: Path | None) -> Outcome:
         """Compute all rows that are asked for; failure is in the outcome's status.
@@ -184,6 +194,44 @@ Solve = Callable[[Any, Observer], Outcome]
 def load_case(module: str) -> AnyCase:
     """The case that a module declares as `CASE`."""
     case: AnyCase = importlib.import_module(module).CASE
+    return case
+
+
+def is_reference(name: str) -> bool:
+    """True if a name is "module:attribute"."""
+    return re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", name) is not None
+
+
+def find_named_case(name: str, shipped: Mapping[str, str]) -> AnyCase:
+    """The case of a name: one that ships, or "module:attribute" of a user's module.
+
+    The attribute is a subclass of :class:`Case` or an instance of one.  Modules are found as by
+    `python -m`, in the working directory too.  Raises BadInput, and KeyError for another name.
+    """
+    if not is_reference(name):
+        return load_case(shipped[name])
+    module, attribute = name.split(":")
+    if "" not in sys.path and str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    try:
+        declared = vars(importlib.import_module(module)).get(attribute)
+    except ModuleNotFoundError as error:
+        raise BadInput(f"{name}: there is no module {error.name!r} here or in PYTHONPATH") from None
+    except Exception as error:
+        raise BadInput(f"{name}: {module} cannot be imported, {one_line(error)}") from None
+    if declared is None:
+        raise BadInput(f"{name}: {module} has no {attribute!r}; allowed: a case, class or instance")
+    try:
+        case = declared() if isinstance(declared, type) else declared
+    except Exception as error:
+        raise BadInput(f"{name}: {attribute}() failed, {one_line(error)}") from None
+    parts = ("name", "title", "parameters", "row")
+    if not isinstance(case, Case) or not all(hasattr(case, part) for part in parts):
+        raise BadInput(
+            f"{name}: {attribute!r} is no case; allowed: a subclass of Case, or an instance, that "
+            f"declares {', '.join(parts)}"
+        )
+    case.source = name
     return case
 
 

@@ -15,7 +15,13 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
 
-from softehl.cases.harness.case import AnyCase, Run, load_case
+from softehl.cases.harness.case import (
+    AnyCase,
+    Run,
+    find_named_case,
+    is_reference,
+    load_case,
+)
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import Parameters, files_of, keys_of
 from softehl.cases.harness.units import is_number, is_quantity
@@ -84,11 +90,15 @@ def _put(values: dict[str, Any], key: str, value: object) -> str:
 
 
 def find_case(given: str, shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:
-    """The case `given` (a shipped name or a TOML file), and what the file sets.  BadInput."""
-    name, table = (given, {}) if given in shipped else _read_file(given, shipped)
-    case = load_case(shipped[name])
+    """The case `given` (shipped name, "module:attribute" or TOML file), and what the file sets.
+
+    Raises BadInput.
+    """
+    named = given in shipped or is_reference(given)
+    name, table = (given, {}) if named else _read_file(given, shipped)
+    case = find_named_case(name, shipped)
     for key in files_of(case.parameters):
-        if given not in shipped and isinstance(table.get(key), str):
+        if not named and isinstance(table.get(key), str):
             table[key] = str(Path(given).parent / table[key])
     return case, table
 
@@ -134,7 +144,7 @@ def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
     if any(isinstance(table.get(way), dict | list) for way in WAYS):
         raise BadInput(f"{given} is a study of many runs: softehl sweep {given}")
     name = table.pop("case", None)
-    if not isinstance(name, str) or name not in shipped:
+    if not isinstance(name, str) or not (name in shipped or is_reference(name)):
         told = "no case" if name is None else f"case = {shown(name)}"
         allowed = " or ".join(f'case = "{known}"' for known in shipped)
         raise BadInput(f"{given}: {told}{meant(str(name), shipped)}; allowed: {allowed}")

@@ -60,8 +60,8 @@ class Outcome:
     states: tuple[Any, ...]
     status: Status
     message: str
-    unknowns: Mapping[str, int]
-    kernel_signatures: Mapping[str, str]
+    unknowns: Mapping[str, int] = field(default_factory=dict)
+    kernel_signatures: Mapping[str, str] = field(default_factory=dict)
     stages: tuple[StageRecord, ...] = ()
     solvers: Mapping[str, str] = field(default_factory=dict)
     numbers: Mapping[str, float] = field(default_factory=dict)

@@ -125,8 +125,8 @@ def _states(content: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 def _difference(content: Mapping[str, Any], run: Run, version: str | None) -> str:
     """Differences of an earlier run from this one, in words; empty if there are none."""
-    if content.get("case") != run.case.name:
-        return f"other parameters: case = {content.get('case')!r}, now {run.case.name!r}"
+    if content.get("case") != run.case.reference:
+        return f"other parameters: case = {content.get('case')!r}, now {run.case.reference!r}"
     before, now = content.get("parameters"), run.parameters.model_dump(mode="json")
     if not isinstance(before, dict):
         return "other parameters: run.json has none"

@@ -200,7 +200,7 @@ class RunRecord:
         seconds = 0.0 if self._began is None else time.perf_counter() - self._began
         stages = self._stages if self._stages is not None else [log.record() for log in self._logs]
         content = {
-            "case": self.run.case.name,
+            "case": self.run.case.reference,
             "status": status,
             "message": message,
             "warnings": self.run.case.warnings(self.run.parameters),

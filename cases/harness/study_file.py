@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from softehl.cases.harness import sampling
-from softehl.cases.harness.case import AnyCase
+from softehl.cases.harness.case import AnyCase, is_reference
 from softehl.cases.harness.case_file import (
     WAYS,
     Contradiction,
@@ -83,11 +83,12 @@ def _case(given: str, table: dict[str, Any], shipped: Shipped) -> tuple[AnyCase,
     """The case of a study, a shipped one or a file beside it, and what both files fix."""
     name = table.pop("case", None)
     path = Path(given).parent / str(name)
-    if not isinstance(name, str) or (name not in shipped and not path.is_file()):
+    named = isinstance(name, str) and (name in shipped or is_reference(name))
+    if not isinstance(name, str) or not (named or path.is_file()):
         told = "no case" if name is None else f"case = {shown(name)}"
         known = ", ".join(f'"{each}"' for each in shipped)
         raise BadInput(f"{given}: {told}; allowed: case = one of {known}, or a case file beside it")
-    case, values = find_case(name if name in shipped else str(path), shipped)
+    case, values = find_case(name if named else str(path), shipped)
     reader = _Reader(case.parameters, given)
     return case, {**values, **{key: reader.placed(key, value) for key, value in table.items()}}
 

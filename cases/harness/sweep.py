@@ -370,7 +370,7 @@ class SweepRecord:
         """The study as run.json has it."""
         study = self.study
         described = {
-            "case": study.case.name,
+            "case": study.case.reference,
             "way": study.way,
             "fixed": dict(study.fixed),
             "keys": list(study.keys),

@@ -10,7 +10,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from softehl.cases.harness.case import Alarm, AnyCase, load_case
+from softehl.cases.harness.case import Alarm, AnyCase, find_named_case
 from softehl.cases.harness.curve_folder import CurveFolder
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
@@ -35,7 +35,7 @@ def read_finished(folder: Path, shipped: Mapping[str, str]) -> FinishedRun:
                 f"{folder} holds a sweep; allowed: one sweep alone, or runs, as in softehl report "
                 f"{folder}/runs/00001 {folder}/runs/00002"
             )
-        case = load_case(shipped[content["case"]])
+        case = find_named_case(content["case"], shipped)
         parameters = case.parameters(**content["parameters"])
         curve, rejected = (CurveFolder(f, case.row) for f in (folder, folder / "rejected"))
         for rows, name in ((curve, "states"), (rejected, "rejected")):

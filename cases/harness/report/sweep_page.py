@@ -9,7 +9,7 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from softehl.cases.harness.case import AnyCase, load_case
+from softehl.cases.harness.case import AnyCase, find_named_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.harness.report.page import asked, capital, left_out, read_finished
@@ -66,7 +66,7 @@ def read_sweep(folder: Path, shipped: Mapping[str, str]) -> FinishedSweep:
     """The sweep in a folder.  Raises BadInput where it cannot be read or has no result yet."""
     try:
         content = read_json(folder / "run.json")
-        case = load_case(shipped[content["case"]])
+        case = find_named_case(content["case"], shipped)
         with (folder / "sweep.csv").open(encoding="utf-8", newline="") as file:
             rows = {int(row["run"]): row for row in csv.DictReader(file)}
         units = {key.name: key.unit for key in keys_of(case.parameters)}
