@@ -47,9 +47,35 @@ def test_a_speed_walks_as_described(called: list[tuple[str, str]], tmp_path: Pat
     assert [step for step in STEPS if step not in ahead] == []  # in this order
 
 
+FOLDERS = "cases|codegen|runtime|tests|docs|generated|src"
+WANTED = {
+    *("cell", "time integrator", "linear solver", "constraint", "mesh format", "contact law"),
+    *("input of sensitivities", "material", "term of the film", "column of `curve.csv`"),
+    *("section", "pass of the compiler", "host", "case"),
+}
+
+
 def test_files_that_are_named_are_there() -> None:
-    for name in re.findall(r"`((?:cases|codegen|runtime|tests|docs|generated)/[\w/.]+)`", PAGE):
-        assert (ROOT / name).exists() or "NAME" in name, name
+    for name in re.findall(rf"`((?:{FOLDERS})/[\w/.]+)`", PAGE):
+        path = ROOT / name
+        assert path.exists() or ("NAME" in name and path.parents[name.count("NAME/")].is_dir()), (
+            name
+        )
+
+
+def test_recipes_name_what_is_in_their_files() -> None:
+    """Words with a capital are names in the files of their recipe, or public."""
+    recipes = re.findall(r"^\*\*An? (.*?)\.?\*\*((?:.|\n)*?)(?=^\*\*|^## )", PAGE, re.MULTILINE)
+    assert {name for name, _ in recipes} == WANTED
+    for recipe, text in recipes:
+        files = [ROOT / name for name in re.findall(rf"`((?:{FOLDERS})/[\w/]+\.py)`", text)]
+        sources = [file.read_text("utf-8") for file in files if file.exists()]
+        inside = {word for source in sources for word in re.findall(r"\b\w+\b", source)}
+        named = set(re.findall(r"`([A-Z_]\w+)`", text)) - {*softehl.__all__, "CASE"}
+        assert named <= inside, recipe
+
+
+def test_modules_that_are_named_are_there() -> None:
     for module in re.findall(r"python -m ([\w.]+)", PAGE):
         if module != "pytest":
             path = module.removeprefix("softehl.").replace(".", "/")
