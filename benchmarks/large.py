@@ -50,17 +50,17 @@ def softehl(n, clock):
         plain = getattr(owner, name)
         setattr(owner, name, lambda *a, **k: clock.run(part, plain, *a, **k))
 
-    def counted(self, method, b, plain=amg.Preconditioned._solved):
+    def counted(self, method, b, plain=amg.AmgFactors._solved):
         found = plain(self, method, b)
         krylov.append(found[1] - 1)
         return found
 
-    amg.Preconditioned._solved = counted
+    amg.AmgFactors._solved = counted
     timed(Problem, "linearise", "assembly")
     timed(Problem, "measure", "assembly")
-    timed(amg.Multigrid, "factorise", "setup")
+    timed(amg.AlgebraicMultigrid, "factorise", "setup")
     timed(amg, "hierarchy", "setup")
-    timed(amg.Preconditioned, "_solved", "solution")
+    timed(amg.AmgFactors, "_solved", "solution")
 
     def block(n):
         study = Study(Mesh.box((1, 1, 1), cells=(n, n, n)))

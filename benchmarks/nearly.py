@@ -53,20 +53,20 @@ def solved(n: int, solver: str) -> tuple[Any, list[int]]:
     if solver == "gamg":
         from softehl.runtime.parallel import petsc, petsc_matrix
 
-        _count(petsc_matrix.Solver, "solve", counts, lambda self, _: self.times.iterations)
+        _count(petsc_matrix.PetscSolver, "solve", counts, lambda self, _: self.times.iterations)
         options = {"ksp_type": "cg", "pc_type": "gamg", "ksp_rtol": TOLERANCE}
         result = study.solve(engine=petsc.Petsc(options))
         return result, [b - a for a, b in zip([0, *counts], counts, strict=False)]
     from softehl.runtime.solve.linear import amg
 
-    _count(amg.Preconditioned, "_solved", counts, lambda _, found: found[1] - 1)
-    plain = amg.Multigrid.factorise
+    _count(amg.AmgFactors, "_solved", counts, lambda _, found: found[1] - 1)
+    plain = amg.AlgebraicMultigrid.factorise
 
     def patient(self: Any, K: Any) -> Any:
         self.tolerance, self.most = TOLERANCE, MatrixFree().most
         return plain(self, K)
 
-    amg.Multigrid.factorise = patient  # type: ignore[method-assign]
+    amg.AlgebraicMultigrid.factorise = patient  # type: ignore[method-assign]
     return study.solve(linear="amg"), counts
 
 

@@ -23,7 +23,7 @@ import sympy as sp
 
 from softehl import Definition, Mesh, Model, Newton, Study, element, kinematics, load_kernel
 from softehl.runtime.results.result import Result
-from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.direct import direct_solver
 
 MU, K, LOAD = 0.4225, 0.9154166666666667, 1 / 16
 STEPS = {"cook": 10, "block": 4}
@@ -78,7 +78,7 @@ def ours(problem: str, n: int) -> Timing:
         study.fix("top", u_x=0, u_y=0, u_z=-0.2)
     study.add("rubber", kernel, mu=MU, bulk=K)
     steps: list[Result] = []
-    newton = Newton(linear=choose("auto"), tolerance=1e-8)
+    newton = Newton(linear=direct_solver("auto"), tolerance=1e-8)
     result = study.solve(steps=STEPS[problem], newton=newton, on_step=steps.append)
     total = time.perf_counter() - begin
     place, name = ((48, 60), "u_y") if problem == "cook" else ((1, 1, 0.5), "u_x")

@@ -22,7 +22,7 @@ import softehl
 from softehl import Mesh, Study
 from softehl.codegen.language.fields import Fields
 from softehl.runtime.arrays import Array
-from softehl.runtime.discretisation.matrix_free_products import Places, Product
+from softehl.runtime.discretisation.matrix_free_products import ElementNumbering, ElementProduct
 
 SAMPLES = 15
 IN_CACHE = 8e5
@@ -54,7 +54,7 @@ def bandwidth() -> float:
     return a.nbytes / least(lambda: a @ a) / 1e9
 
 
-def prepared(order: int, unknowns: float, threads: int) -> tuple[Product, Array, Array]:
+def prepared(order: int, unknowns: float, threads: int) -> tuple[ElementProduct, Array, Array]:
     """The product of a cube, and two vectors."""
     n = max(round((unknowns / 3) ** (1 / 3) / order), 1)
     mesh = Mesh.box((1, 1, 1), cells=(n, n, n), order=order)
@@ -64,9 +64,9 @@ def prepared(order: int, unknowns: float, threads: int) -> tuple[Product, Array,
     study.add("body", rubber, **given)
     system = study.system()
     block = system.assembler.block("body")
-    places = Places.of(block, threads)
+    places = ElementNumbering.of(block, threads)
     parameters = np.ones(len(block.kernel.parameters))
-    product = Product.of(block, np.zeros(system.size), parameters, places)
+    product = ElementProduct.of(block, np.zeros(system.size), parameters, places)
     v = places.vector()
     v[: places.unknowns.size] = 1.0
     return product, v, places.vector()

@@ -88,22 +88,22 @@ def _buckling_modes(
     """
     words = f"buckling({count})"
     require_count(words, count)
-    share, t, x = system.share, state.parameter, state.solution.x
+    comm, t, x = system.comm, state.parameter, state.solution.x
     here = SymmetricTangent.at(system, problem_at(t), x, words)
     r, K = problem_at(t + 1.0).linearise(x)
     try:
         response = -newton.linear.factorise(K).solve(r)
     except SingularMatrix as error:
         raise StudyError(f"{words}: {error}") from None
-    most = share.largest(float(np.abs(response).max(initial=0.0)))
+    most = comm.max(float(np.abs(response).max(initial=0.0)))
     if not most > 0.0:
         raise StudyError(f"{words}: nothing changes with the load factor; give loads or fix(...)")
-    h = _LENGTH * share.largest(float(np.ptp(system.mesh.points, axis=0).max())) / most
+    h = _LENGTH * comm.max(float(np.ptp(system.mesh.points, axis=0).max())) / most
     ahead = SymmetricTangent.at(system, problem_at(t + h), x + h * response, words).K
     behind = SymmetricTangent.at(system, problem_at(t - h), x - h * response, words).K
     change = csc_array((ahead - behind) / (2.0 * h))
     try:
-        factors, found = share.buckling(here.problem, here.K, change, count)
+        factors, found = comm.buckling(here.problem, here.K, change, count)
     except (NoModes, SingularMatrix) as error:
         raise StudyError(f"{words}: {error}") from None
     return t + factors, found

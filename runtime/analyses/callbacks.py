@@ -58,7 +58,7 @@ class Series:
         name = f"{self.path.stem}_{len(self.entries) + 1:04d}.{kind}"
         result.write(self.path.with_name(name))
         self.entries.append((result.t, name))
-        if result.system.share.first:
+        if result.system.comm.is_root:
             write_pvd(self.path, self.entries)
 
 

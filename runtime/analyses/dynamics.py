@@ -130,11 +130,11 @@ def _continued(
 ) -> Iterator[Motion]:
     """Continue a motion with its accelerations and forces."""
     system = body.plain
-    if system.share.pieces[1] > 1:  # of which each has its own unknowns
+    if system.comm.rank_and_size[1] > 1:  # of which each has its own unknowns
         a = _nodal_rates(system, start, start.acceleration)
         return march.run(body, replace(state, a=a), until)
     state = replace(state, x=start.x, v=start.v, a=start.a)
-    return march.run(body, state, until, system.share.part(start.problem))
+    return march.run(body, state, until, system.comm.local_problem(start.problem))
 
 
 def _with_supports(body: Body, state: MotionState, problem: Problem, dt: float) -> MotionState:
@@ -153,9 +153,9 @@ def _consistent_state(
 
     problem: equations without inertia at the state.
     """
-    if body.share.largest(float(body.constrained.any())):
+    if body.comm.max(float(body.constrained.any())):
         state = _constrained_state(body, state, dt, newton)
-    elif body.share.largest(float(body.algebraic(problem).any())):
+    elif body.comm.max(float(body.algebraic(problem).any())):
         state = replace(state, x=_massless_equilibrium(body, problem, state.x, newton))
     problem = body.at_end(state.ended_step(dt), state.v)
     return replace(state, a=body.started(problem, state.x))
@@ -181,7 +181,7 @@ def _massless_equilibrium(body: Body, problem: Problem, x: Array, newton: Newton
     fixed = np.union1d(problem.fixed, np.flatnonzero(body.heavy))
     massless = replace(problem, fixed=fixed, values=x[fixed])
     with np.errstate(all="ignore"):
-        solution = newton.solve(body.share.posed(massless), x)
+        solution = newton.solve(body.comm.distribute(massless), x)
     return solution.x if solution.converged else x
 
 
@@ -191,7 +191,7 @@ def _backward_euler_step(
     """The end of a step of length h, and the velocities there.  Raises StudyError."""
     integrator = BackwardEulerDynamics()
     step, velocity = _implicit_step(integrator, body, state, h)
-    problem = body.moving.share.posed(body.problem(step, 1.0, 0.0 * state.x))
+    problem = body.moving.comm.distribute(body.problem(step, 1.0, 0.0 * state.x))
     with np.errstate(all="ignore"):
         solution = newton.solve(problem, state.x)
     if not solution.converged:
@@ -234,7 +234,7 @@ class ImplicitMarch:
 
         end: equations without inertia of the step that ended at the state, if there was one.
         """
-        ledger, log = Ledger(body.share), PathLog("t")
+        ledger, log = Ledger(body.comm), PathLog("t")
         stepper = _ImplicitStepper(self, body, state, until, ledger, equations=end)
         for _ in path_points(stepper, StepRule(self.dt, SMALLEST * self.dt), log):
             log.points = log.points[-1:]
@@ -279,7 +279,7 @@ class _ImplicitStepper(Stepper):
         assert self.forces is not None
         initial_forces = integrator.initial_weight * self.forces.total
         problem = body.problem(time_step, integrator.load_time, initial_forces)
-        newton, distributed = self.march.newton, body.moving.share.posed(problem)
+        newton, distributed = self.march.newton, body.moving.comm.distribute(problem)
         x = body.weighted(state.x, 1.0 / body.weight)
         with np.errstate(all="ignore"):
             solution = newton.solve(distributed, x + dt * state.v)
@@ -345,7 +345,7 @@ class _ImplicitStepper(Stepper):
     def _motion(self, end: Problem, state: MotionState, solution: Solution) -> Motion:
         return Motion(
             self.body.plain,
-            self.body.share.posed(end.at(state.x)),
+            self.body.comm.distribute(end.at(state.x)),
             Point(state.t, solution),
             state.histories,
             v=state.v,

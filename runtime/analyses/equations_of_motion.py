@@ -11,14 +11,18 @@ from scipy.sparse import csc_array
 from softehl.runtime.analyses.motion import Forces, Roles
 from softehl.runtime.analyses.time_integrators import Affine, SecondOrderIntegrator
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.contact.search import TouchingProblem
+from softehl.runtime.contact.search import ContactProblem
 from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.assembly import Assembler
-from softehl.runtime.discretisation.communicator import Share
-from softehl.runtime.discretisation.discrete_gradient import Averaged, time_derivatives, with_old
+from softehl.runtime.discretisation.communicator import Communicator
+from softehl.runtime.discretisation.discrete_gradient import (
+    DiscreteGradientKernel,
+    time_derivatives,
+    with_old,
+)
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Tie
-from softehl.runtime.discretisation.mass import Mass, lumped
+from softehl.runtime.discretisation.mass import MassKernel, lumped
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.contact_setup import weighted
 from softehl.runtime.equations.mass_matrix import Masses, mass_blocks, mass_matrix
@@ -113,12 +117,12 @@ class Body:
     ) -> Body:
         """Raises StudyError where there is no mass, or where a rate belongs to none."""
         problem, blocks = system.part(at), mass_blocks(system, mass)
-        share, M = system.share, mass_matrix(system, problem, at.old, mass)
-        heavy = share.added(M.diagonal()) > 0.0
+        comm, M = system.comm, mass_matrix(system, problem, at.old, mass)
+        heavy = comm.sum_shared(M.diagonal()) > 0.0
         for block in system.blocks.values():
             for slot in block.rates.values():
                 numbers = system.numbering.nodal[slot.name]
-                if share.largest(float(not heavy[numbers[numbers >= 0]].all())):
+                if comm.max(float(not heavy[numbers[numbers >= 0]].all())):
                     raise StudyError(
                         f"{block.name!r} has a rate of {slot.name}, which has no mass everywhere: "
                         'give it one, or march by "euler" or "bdf2"'
@@ -133,9 +137,7 @@ class Body:
             free = [b for b in own if roles.of[b.name] not in ("tie", "contact")]
             changed = {b.name: _averaged(b, system.blocks.get(b.name), massless) for b in free}
             own = [changed.get(b.name, b) for b in own]
-        elif (
-            integrator is not None and not integrator.damps and share.largest(float(massless.any()))
-        ):
+        elif integrator is not None and not integrator.damps and comm.max(float(massless.any())):
             raise StudyError(
                 f"{_name_of(system, massless)} is a multiplier, whose error grows in steps of "
                 'method = "newmark" or of rho_inf = 1, which damp nothing: take '
@@ -146,36 +148,38 @@ class Body:
         factors = np.ones(system.size)
         factors[roles.bound[~heavy[roles.bound]]] = 1.0 / weight
         own = [b if roles.of[b.name] in ("tie", "contact") else _scaled(b, factors) for b in own]
-        rows = share.owned(system.size)
+        rows = comm.owned(system.size)
         rows = rows[heavy[rows]][:, None]
         before = ElementBlock(_BEFORE, _Known(), np.empty((0, 0)), rows, check_orientation=False)
         assembler = Assembler.build(system.size, [*own, *blocks, before])
         lumps = _lumped(system, M, blocks) if integrator is None else M.diagonal()
-        moving = replace(system, assembler=assembler, contacts=contacts, share=share.renewed())
+        moving = replace(
+            system, assembler=assembler, contacts=contacts, comm=comm.with_other_elements()
+        )
         constrained = massless.copy()
         constrained[roles.multipliers] = True
         return cls(system, moving, M, lumps, heavy, roles, weight, mass, factors, constrained)
 
     @property
-    def share(self) -> Share:
+    def comm(self) -> Communicator:
         """Distribution of its unknowns over processes."""
-        return self.plain.share
+        return self.plain.comm
 
     def problem(self, step: Step, place: float, before: Array) -> Problem:
         """Equations of a step that ends at step.t: loads of a place in it, supports of its end.
 
         before: (n,) forces that are added where there is mass.
         """
-        before = self.share.added(before)
+        before = self.comm.sum_shared(before)
         problem = self.moving.part(replace(step, t=step.t - (1.0 - place) * step.dt))
         end = problem if place == 1.0 else self.plain.part(step)
         remainder = np.zeros(len(before)) if step.remainder is None else step.remainder
         blocks, parameters = [], dict(problem.parameters)
         for block in problem.assembler.blocks:
             known = block
-            if isinstance(block.kernel, Averaged):
+            if isinstance(block.kernel, DiscreteGradientKernel):
                 known = with_old(block, step.old)
-            elif isinstance(block.kernel, Mass):
+            elif isinstance(block.kernel, MassKernel):
                 known = replace(block, data=np.ascontiguousarray(remainder[block.dofs]))
             elif isinstance(block.kernel, _Known):
                 known = replace(block, data=before[block.dofs])
@@ -206,10 +210,10 @@ class Body:
         problem = self.plain.part(at)
         with np.errstate(all="ignore"):
             K = problem.assembler.linearise(at.old, problem.parameters)[1]
-        stiff, mass = (self.share.added(A.diagonal()) for A in (K, self.M))
+        stiff, mass = (self.comm.sum_shared(A.diagonal()) for A in (K, self.M))
         known = (mass > 0.0) & np.isfinite(stiff)
         ratio = float((np.abs(stiff[known]) / mass[known]).max(initial=0.0))
-        return float(np.sqrt(max(self.share.largest(ratio), np.finfo(np.float64).tiny)))
+        return float(np.sqrt(max(self.comm.max(ratio), np.finfo(np.float64).tiny)))
 
     def weighted(self, x: Array, weight: float) -> Array:
         """Unknowns (n,) with those of ties and contacts times a number."""
@@ -221,7 +225,7 @@ class Body:
         """Work of friction at the end x of a step in which the unknowns moved (n,)."""
         if not any(contact.friction for contact in self.plain.contacts):
             return 0.0
-        assert isinstance(problem, TouchingProblem)
+        assert isinstance(problem, ContactProblem)
         smooth = tuple(replace(c, friction=0.0) for c in self.plain.contacts)  # type: ignore[type-var]
         other = replace(problem, contacts=smooth, latest=[])
         whole, normal = (Forces.of(p, x, self.roles).contact for p in (problem, other))
@@ -234,14 +238,14 @@ class Body:
     def started(self, problem: Problem, x: Array) -> Array:
         """Accelerations (n,) at the start x: M a = -f on what is free.  Raises StudyError."""
         forces = Forces.of(problem, x, self.roles)
-        free = self.share.free(problem)
+        free = self.comm.constraint_map(problem)
         diagonal = free.gather(self.M.diagonal())
         inverse = 1.0 / np.where(diagonal > 0.0, diagonal, np.inf)
         found = conjugate_gradients(
             lambda z: free.gather(self.M @ free.spread(z)),
             lambda r: inverse * r,
             np.where(diagonal > 0.0, -free.gather(forces.total + forces.constraints), 0.0),
-            *(_EXACT, _MOST, self.share.dot),
+            *(_EXACT, _MOST, self.comm.dot),
         )
         if not found.converged:
             raise StudyError("the mass is not positive: no accelerations at the start are found")
@@ -263,12 +267,12 @@ def _multipliers(system: System, problem: Problem, x: Array, heavy: Flags, roles
     """Unknowns (n,) of pages without mass that stand in no equation without mass, at x, (n,)."""
     massless = ~heavy
     massless[problem.fixed] = massless[roles.multipliers] = False
-    if not system.share.largest(float(massless.any())):
+    if not system.comm.max(float(massless.any())):
         return massless
     here = problem.at(x)
     with np.errstate(all="ignore"):
         K = here.assembler.linearise(x, here.parameters)[1]
-    among = system.share.added(np.asarray(abs(K) @ massless.astype(np.float64)))
+    among = system.comm.sum_shared(np.asarray(abs(K) @ massless.astype(np.float64)))
     found: Flags = massless & (among == 0.0)
     return found
 
@@ -293,7 +297,7 @@ def _averaged(block: ElementBlock, page: Block | None, multipliers: Flags) -> El
     if page is not None and "dt" in block.kernel.parameters and "dt" not in page.parameters:
         length = list(block.kernel.parameters).index("dt")
     columns = np.flatnonzero(multipliers[block.dofs].any(axis=0))
-    averaged = Averaged(block.kernel, timed, length, columns)
+    averaged = DiscreteGradientKernel(block.kernel, timed, length, columns)
     return replace(block, kernel=averaged, constant=False)
 
 
@@ -301,20 +305,20 @@ def _lumped(system: System, M: csc_array, blocks: list[ElementBlock]) -> Array:
     """Masses (n,) at the nodes: of densities cell by cell, of pages unknown by unknown."""
     found, consistent = np.zeros(system.size), np.zeros(system.size)
     for block in blocks:
-        assert isinstance(block.kernel, Mass)
+        assert isinstance(block.kernel, MassKernel)
         m, components = block.kernel.matrices, block.kernel.components
         np.add.at(found, block.dofs, np.tile(lumped(m), (1, components)))
         np.add.at(consistent, block.dofs, np.tile(np.einsum("naa->na", m), (1, components)))
-    share, rest = system.share, M.diagonal() - consistent
-    most = share.largest(float(np.abs(M.diagonal()).max(initial=0.0)))
-    if share.largest(float(np.abs(rest).max(initial=0.0))) <= 1e-12 * most:
+    comm, rest = system.comm, M.diagonal() - consistent
+    most = comm.max(float(np.abs(M.diagonal()).max(initial=0.0)))
+    if comm.max(float(np.abs(rest).max(initial=0.0))) <= 1e-12 * most:
         return found
     total = np.asarray(M.sum(axis=1)).ravel()
     if blocks:
         raise StudyError("explicit: give all masses as mass=..., or all in pages, not both")
     for name in system.numbering.layout.names:
         part = system.numbering.layout.part(name)
-        whole, known = share.total(np.array([total[part].sum(), rest[part].sum()])).tolist()
+        whole, known = comm.sum(np.array([total[part].sum(), rest[part].sum()])).tolist()
         if known:
             found[part] = rest[part] * whole / known
     return found

@@ -53,7 +53,7 @@ class ExplicitMarch:
         """From a state with velocities.  Raises StudyError where an unknown needs a mass."""
         problem = body.at_end(state.ended_step(dt), state.v)
         _require_lumped_masses(body, problem)
-        free = body.share.free(problem)
+        free = body.comm.constraint_map(problem)
         march = cls(dt, body, state, free, free.gather(body.lumps), integrator)
         a = march._accelerations(Forces.of(problem, state.x, body.roles).total)
         march.here = replace(state, a=a)
@@ -61,7 +61,7 @@ class ExplicitMarch:
 
     def run(self, until: float) -> Iterator[Motion]:
         """Results every dt until the end.  Raises StudyError, NotConverged."""
-        ledger = Ledger(self.body.share)
+        ledger = Ledger(self.body.comm)
         begin = self.body.at_end(self.here.ended_step(self.dt), self.here.v)
         self._told(begin, ledger)
         end, stable = begin, self._stable(begin)
@@ -85,8 +85,8 @@ class ExplicitMarch:
         x[end.fixed] = end.values
         half[end.fixed] = (x - here.x)[end.fixed] / dt
         forces = Forces.of(end, x, body.roles)
-        if self.body.share.largest(float(not np.isfinite(forces.total).all())):
-            where = body.share.posed(end).where_not_finite(x)
+        if self.body.comm.max(float(not np.isfinite(forces.total).all())):
+            where = body.comm.distribute(end).where_not_finite(x)
             words = f"t = {t:.6g}: the forces are not finite{where}"
             state = Solution(here.x, Status.NOT_FINITE, words, (), 0, 0)
             raise NotConverged(Branch((Point(here.t, state),), Status.NOT_FINITE, words))
@@ -111,14 +111,14 @@ class ExplicitMarch:
     def _stable(self, problem: Problem) -> float:
         """2 over the highest frequency about the present state."""
         K = symmetric(problem.assembler.linearise(self.here.x, problem.parameters)[1])
-        free, root, share = self.free, 1.0 / np.sqrt(self.masses), self.body.share
+        free, root, comm = self.free, 1.0 / np.sqrt(self.masses), self.body.comm
 
         def scaled(z: Array) -> Array:
             forces: Array = K @ free.spread(root * z)
             return root * free.gather(forces)
 
-        begin = np.random.default_rng(share.pieces[0]).uniform(-1.0, 1.0, len(root))
-        found = highest(scaled, begin, share.dot, _ACCURATE)
+        begin = np.random.default_rng(comm.rank_and_size[0]).uniform(-1.0, 1.0, len(root))
+        found = highest(scaled, begin, comm.dot, _ACCURATE)
         return self.integrator.stable_step(found) if found > 0.0 else self.dt / SAFE
 
     def _told(self, end: Problem, ledger: Ledger) -> dict[str, float]:
@@ -132,14 +132,14 @@ class ExplicitMarch:
         for block in end.assembler.blocks:
             if isinstance(block.kernel, Tie):
                 r = block.residual(here.x, end.parameters[block.name])[:, 2]
-                apart = self.body.share.largest(float(np.abs(r).max(initial=0.0)))
+                apart = self.body.comm.max(float(np.abs(r).max(initial=0.0)))
                 if apart > _APART * size:
                     raise StudyError(
                         f'{block.name}: opens by {apart:.3g}; method = "explicit" holds '
                         "ties of a constant offset, on no side of which a support moves"
                     )
         solution = Solution(here.x, Status.CONVERGED, f"{steps} steps", (), 0, 0)
-        posed = self.body.share.posed(end)
+        posed = self.body.comm.distribute(end)
         return Motion(
             *(self.body.plain, posed, Point(here.t, solution), here.histories),
             v=here.v, a=here.a, energy=self._told(end, ledger), stable_step=stable,
@@ -148,8 +148,8 @@ class ExplicitMarch:
 
 def _require_lumped_masses(body: Body, problem: Problem) -> None:
     """Raise StudyError where an unknown has no mass that needs one."""
-    system, share = body.plain, body.share
-    without = share.added(body.lumps) <= 0.0
+    system, comm = body.plain, body.comm
+    without = comm.sum_shared(body.lumps) <= 0.0
     for block in problem.assembler.blocks:
         if isinstance(block.kernel, Tie):
             without[block.dofs[:, 2]] = False
@@ -157,7 +157,7 @@ def _require_lumped_masses(body: Body, problem: Problem) -> None:
     touches = [] if system.statement is None else system.statement.contacts
     internal = {n for b in system.blocks.values() for n in getattr(b.kernel, "internal", ())}
     for name in layout.names:
-        if share.largest(float(without[layout.part(name)].any())):
+        if comm.max(float(without[layout.part(name)].any())):
             if any(name == touch.unknown(m) for touch in touches for m in ("lambda", "tau")):
                 raise StudyError(
                     'method = "explicit" takes no contact: take "generalised-alpha", which damps '

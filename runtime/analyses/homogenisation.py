@@ -27,7 +27,7 @@ from softehl.runtime.equations.system_builder import equations
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.continuation import Continuation, StepRule
-from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
 from softehl.runtime.suggestions import listed
@@ -76,7 +76,7 @@ class Homogenised:
         stiff = K @ modes
         found = modes.T @ stiff
         if T.shape[1]:  # else nothing fluctuates: one linear cell
-            factors = choose("auto").factorise(csc_array(T.T @ K @ T))
+            factors = direct_solver("auto").factorise(csc_array(T.T @ K @ T))
             bent = np.stack([factors.solve(row) for row in np.asarray(T.T @ stiff).T], axis=1)
             found = found - modes.T @ (K @ (T @ bent))
         return np.asarray(found).reshape(2 * self.F.shape) / self.cell.volume
@@ -151,7 +151,7 @@ class Cell:
         path = _Path(self, free, before, after, x0, self._histories(start))
         first = 1.0 / count
         follow = Continuation(
-            newton or Newton(linear=choose("auto")),
+            newton or Newton(linear=direct_solver("auto")),
             StepRule(first, min(SMALLEST, first), first),
             name="share of the load",
         ).follow

@@ -46,9 +46,9 @@ def initial_state(system: System, start: Result | None) -> InitialState:
     x, values = whole.at_rest(), start.x
     _take_nodal(whole, before, x, values)
     _take_others(whole, before, x, values)
-    share = system.share
-    histories = share.own_state(_histories(whole, before, start.state))
-    return InitialState(start.t, share.own(x), histories)
+    comm = system.comm
+    histories = comm.restrict_state(_histories(whole, before, start.state))
+    return InitialState(start.t, comm.restrict(x), histories)
 
 
 def _same(a: Mesh, b: Mesh) -> bool:

@@ -20,7 +20,7 @@ from softehl.runtime.equations.system import Step, System
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity.tape import Trail, continued
 from softehl.runtime.solve.continuation import Continuation, StepRule
-from softehl.runtime.solve.linear.factorisation_cache import iterating
+from softehl.runtime.solve.linear.factorisation_cache import iterative_part
 from softehl.runtime.solve.linear.linear_solver import LinearSolver
 from softehl.runtime.solve.singularity_check import LastFactorisation, SupportCheck
 from softehl.runtime.solve.solution import Branch, NotConverged, Point
@@ -77,7 +77,7 @@ class LoadHistory:
             self.x,
             before=previous if self.record else None,
             kept=self.memory,
-            linear=None if self.linear is None else iterating(self.linear),
+            linear=None if self.linear is None else iterative_part(self.linear),
         )
         result = Result(self.system, problem, point, self.histories, trail)
         if not self.keep_all:

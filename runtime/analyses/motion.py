@@ -11,7 +11,7 @@ import numpy as np
 from softehl.errors import UnknownNameError
 from softehl.log import warn
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.discretisation.communicator import Share
+from softehl.runtime.discretisation.communicator import Communicator
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.discretisation.problem import Problem
@@ -101,7 +101,7 @@ class Motion(Result):
         return self._nodal(name, self.a)
 
     def _nodal(self, name: str, values: Array) -> Array:
-        nodal, values = self._whole.numbering.nodal, self.system.share.whole(values)
+        nodal, values = self._whole.numbering.nodal, self.system.comm.gather(values)
         if name not in nodal:
             raise UnknownNameError(
                 f"no unknown {name!r}{meant(name, nodal)}; at nodes: {listed(nodal)}"
@@ -277,12 +277,12 @@ class EnergyGain(RuntimeWarning):
 class Ledger:
     """Energies of a march: work of loads and of forces without an energy, since the beginning.
 
-    share: of the processes, of which each knows the work of its elements. largest: sum of the
+    comm: of the processes, of which each knows the work of its elements. largest: sum of the
     sizes of kinetic, internal and external energy so far. latest: what the last steps have gained;
     less counts where a motion begins from nothing, or is damped at once.
     """
 
-    share: Share
+    comm: Communicator
     first: float = float("nan")
     external: float = 0.0
     others: float = 0.0
@@ -308,7 +308,7 @@ class Ledger:
         """
         size = 0.5 * float((forces.stored + forces.others) @ x)
         known = np.array([kinetic, stored, self.external, self.others, size])
-        kinetic, stored, external, others, size = self.share.total(known).tolist()
+        kinetic, stored, external, others, size = self.comm.sum(known).tolist()
         internal = stored + others
         if np.isnan(self.first):
             self.first = kinetic + internal
@@ -317,7 +317,7 @@ class Ledger:
         self.largest = max(self.largest, present)
         self.latest = [*self.latest[1 - LASTS :], balance]
         lasts = len(self.latest) == LASTS and min(self.latest) > GAIN * self.largest
-        if lasts and not self.warned and self.share.first:
+        if lasts and not self.warned and self.comm.is_root:
             self.warned = True
             warn(
                 f"t = {t:.6g}: {balance / self.largest:.0%} of the energy of the motion come from "

@@ -98,7 +98,7 @@ class PreparedSystem:
         results, if not those of `options.write`.
         """
         progress = None
-        if self.system.share.first:
+        if self.system.comm.is_root:
             progress = Progress.on_stderr(
                 self.options.progress, parameter, begin, until, note=self.solver_note
             )

@@ -44,7 +44,7 @@ from softehl.runtime.solve.continuation import (
     path_points,
     polynomial_value,
 )
-from softehl.runtime.solve.linear.factorisation_cache import iterating
+from softehl.runtime.solve.linear.factorisation_cache import iterative_part
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.singularity_check import LastFactorisation, SupportCheck
 from softehl.runtime.solve.solution import NotConverged, Point, Status
@@ -182,7 +182,7 @@ class AdaptiveMarch:
             if stepper.result is None:
                 continue  # the initial state
             if checkpoint is not None:
-                stepper.levels.save(checkpoint, system.share, self.dt, digests)
+                stepper.levels.save(checkpoint, system.comm, self.dt, digests)
             yield stepper.result
         if not log.branch().converged:
             raise NotConverged(log.branch(), stepper.result)
@@ -303,7 +303,7 @@ class _TimeStepper(Stepper):
             solution.x,
             before=previous if self.memory else None,
             kept=self.memory,
-            linear=iterating(self.march.newton.linear),
+            linear=iterative_part(self.march.newton.linear),
         )
         self.result = Result(system, problem, Point(step.t, solution), histories, trail)
 
@@ -332,7 +332,7 @@ def _constraint_forces(system: System) -> set[str]:
 
 
 def _largest(system: System, values: Array) -> float:
-    return system.share.largest(float(np.abs(values).max(initial=0.0)))
+    return system.comm.max(float(np.abs(values).max(initial=0.0)))
 
 
 def _extrapolated(levels: TimeLevels, t: float, count: int = 2) -> Array:

@@ -1,4 +1,4 @@
-"""Common part of two faces in space, projected along the mean normal of the first: triangles.
+"""Mortar overlap of two faces in 3-D, projected along the mean normal of the first: triangles.
 
 Corners of the part are corners of the face, corners of the other one, or where their edges cross.
 Each is told in a way that says how it moves with the nodes: parent coordinates xi + A v on the face
@@ -30,7 +30,7 @@ class Triangles:
 
 
 def common_part(one: Cell, mine: Array, other: Cell, theirs: Array) -> Triangles:
-    """Of pairs of faces with corners (n, a, 3) and (n, b, 3) that look at each other."""
+    """Overlap of pairs of opposite faces with corners (n, a, 3) and (n, b, 3)."""
     a, b = one.corners, other.corners
     plane = _plane(one, mine[:, :a])
     S, M = (np.einsum("nkc,ncd->nkd", x, plane) for x in (mine[:, :a], theirs[:, :b]))

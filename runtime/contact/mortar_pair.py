@@ -1,4 +1,4 @@
-"""Elements of contact in space: the law of a point (page `touch`), integrated over a triangle.
+"""Mortar elements of contact in 3-D: the law of a point (page `touch`) integrated over a triangle.
 
 A triangle is part of what a face and another one have in common (`common_part`). Places, slopes and
 multipliers of a point are interpolated here, and the tangent of the law is carried over to the
@@ -26,7 +26,7 @@ _Varied: TypeAlias = tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
-class FacePair:
+class MortarPairKernel:
     """A kernel of assembly: a triangle of a face and another one.
 
     Unknowns are the displacements of the nodes of both, node by node, then lambda, tau_x, tau_y,
@@ -59,7 +59,7 @@ class FacePair:
         n, ndof = dofs.shape
         R, K = np.zeros((n, ndof)), np.zeros((n, ndof, ndof))
         if n:
-            at = _Places.of(self, coordinates, dofs, given["data"])
+            at = _PairGeometry.of(self, coordinates, dofs, given["data"])
             for weight, point in at.points():
                 self._add(R, K, at, weight, point)
         return R, K
@@ -68,7 +68,9 @@ class FacePair:
         """None, (n, 0, 0): fields are those of the whole face."""
         return np.empty((len(dofs), 0, 0))
 
-    def _add(self, R: Array, K: Array, at: _Places, weight: _Varied, point: _Point) -> None:
+    def _add(
+        self, R: Array, K: Array, at: _PairGeometry, weight: _Varied, point: _IntegrationPoint
+    ) -> None:
         """Add a point of all triangles in place."""
         n, width = len(R), 3 * at.nodes
         z, dz = point.inputs
@@ -86,8 +88,8 @@ class FacePair:
         df += f[:, :, None] * dW[:, None]
         f = W[:, None] * f
         for part, columns, (S, dS) in (
-            (slice(width), slice(3), point.shares),
-            (slice(width, None), slice(3, None), point.own),
+            (slice(width), slice(3), point.node_weights),
+            (slice(width, None), slice(3, None), point.multiplier_weights),
         ):
             k, c = S.shape[1], f[:, columns].shape[1]
             R[:, part] += (S[:, :, None] * f[:, None, columns]).reshape(n, k * c)
@@ -97,31 +99,35 @@ class FacePair:
 
 
 @dataclass(frozen=True, eq=False)
-class _Point:
-    """inputs: of the law, (n, 16). shares: of the nodes of both; own: of the multipliers."""
+class _IntegrationPoint:
+    """Integration point. inputs: of the law, (n, 16). node_weights: of the nodes of both faces;
+    multiplier_weights: of the multipliers.
+    """
 
     inputs: _Varied
-    shares: _Varied
-    own: _Varied
+    node_weights: _Varied
+    multiplier_weights: _Varied
 
 
 @dataclass(frozen=True, eq=False)
-class _Places:
+class _PairGeometry:
     """Nodes of the elements at rest X, now x, and before, (n, nodes, 3), and multipliers.
 
     limits: rho, friction, depth, reach.
     """
 
-    pair: FacePair
+    pair: MortarPairKernel
     X: Array
     x: Array
-    before: Array
+    previous: Array
     multipliers: Array
     limits: Array
     corners: Array
 
     @classmethod
-    def of(cls, pair: FacePair, coordinates: Array, dofs: Array, data: Array) -> _Places:
+    def of(
+        cls, pair: MortarPairKernel, coordinates: Array, dofs: Array, data: Array
+    ) -> _PairGeometry:
         n, width = len(dofs), coordinates.shape[1]
         X = coordinates.reshape(n, -1, 3)
         x, previous = (X + v[:, :width].reshape(X.shape) for v in (dofs, data))
@@ -135,12 +141,12 @@ class _Places:
         return int(self.x.shape[1])
 
     @property
-    def mine(self) -> slice:
+    def side_nodes(self) -> slice:
         """Nodes of the face."""
         return slice(0, len(self.pair.one.nodes))
 
     @property
-    def theirs(self) -> slice:
+    def other_nodes(self) -> slice:
         """Nodes of the other one."""
         return slice(len(self.pair.one.nodes), None)
 
@@ -149,7 +155,7 @@ class _Places:
         """Unknowns of an element."""
         return 3 * self.nodes + MULTIPLIERS * int(self.multipliers.shape[1])
 
-    def points(self) -> Iterator[tuple[_Varied, _Point]]:
+    def points(self) -> Iterator[tuple[_Varied, _IntegrationPoint]]:
         """Weights and points of the rule of a triangle."""
         normal = self._normal()
         start, *other_corners = (self._corner(k, normal) for k in range(3))
@@ -159,23 +165,32 @@ class _Places:
         area = area[0] * positive, area[1] * positive[:, None]
         for (s, t), weight in zip(*_rule(self.pair), strict=True):
             z = _plus(start, _plus(_times(s, along), _times(t, across)))
-            xi = self._met(self.pair.one, self.mine, z, normal)
-            slope = self._slopes(self.pair.one, self.mine, xi)
+            xi = self._project(self.pair.one, self.side_nodes, z, normal)
+            slope = self._gradient(self.pair.one, self.side_nodes, xi)
             first, second = ((slope[0][:, :, d], slope[1][:, :, d]) for d in (0, 1))
             area_ratio = _over(self._area(*xi), _triple(first, second, normal))
             yield (
                 _product(_times(weight, area), area_ratio),
-                self._point(xi, self._met(self.pair.other, self.theirs, z, normal), first, second),
+                self._point(
+                    xi, self._project(self.pair.other, self.other_nodes, z, normal), first, second
+                ),
             )
 
-    def _point(self, xi: _Varied, eta: _Varied, first: _Varied, second: _Varied) -> _Point:
-        one, other, side_nodes, other_nodes = self.pair.one, self.pair.other, self.mine, self.theirs
+    def _point(
+        self, xi: _Varied, eta: _Varied, first: _Varied, second: _Varied
+    ) -> _IntegrationPoint:
+        one, other, side_nodes, other_nodes = (
+            self.pair.one,
+            self.pair.other,
+            self.side_nodes,
+            self.other_nodes,
+        )
         x, y = (
-            self._place(one, self.x, side_nodes, xi),
-            self._place(other, self.x, other_nodes, eta),
+            self._moving_point(one, self.x, side_nodes, xi),
+            self._moving_point(other, self.x, other_nodes, eta),
         )
         was, were = (
-            self._held(cell, self.before[:, part], at)
+            self._interpolate(cell, self.previous[:, part], at)
             for cell, part, at in ((one, side_nodes, xi), (other, other_nodes, eta))
         )
         N, dN = _shapes(one, xi)
@@ -188,23 +203,23 @@ class _Places:
         parts = [_minus(y, x), first, second, _minus(were, was), (lam, dlam)]
         z, dz = (np.concatenate([p[i] for p in parts], axis=1) for i in (0, 1))
         node_weights = np.concatenate([N, -M], axis=1), np.concatenate([dN, -dM], axis=1)
-        return _Point((z, dz), node_weights, (L, dL))
+        return _IntegrationPoint((z, dz), node_weights, (L, dL))
 
-    def _place(self, cell: Cell, x: Array, part: slice, at: _Varied) -> _Varied:
+    def _moving_point(self, cell: Cell, x: Array, part: slice, at: _Varied) -> _Varied:
         """Place of parent coordinates, with the motion of the nodes."""
-        point, change = self._held(cell, x[:, part], at)
+        point, change = self._interpolate(cell, x[:, part], at)
         shape = cell.shape(at[0])
         numbers = range(self.nodes)[part]
         for c in range(3):
             change[:, c, [3 * i + c for i in numbers]] += shape
         return point, change
 
-    def _held(self, cell: Cell, x: Array, at: _Varied) -> _Varied:
+    def _interpolate(self, cell: Cell, x: Array, at: _Varied) -> _Varied:
         """Place of parent coordinates on nodes (n, k, 3) that do not move."""
         N, dN = _shapes(cell, at)
         return np.einsum("nk,nkc->nc", N, x), np.einsum("nkm,nkc->ncm", dN, x)
 
-    def _slopes(self, cell: Cell, part: slice, at: _Varied) -> _Varied:
+    def _gradient(self, cell: Cell, part: slice, at: _Varied) -> _Varied:
         """Slopes (n, 3, 2) of the face."""
         G, dG = _gradients(cell, at)
         x = self.x[:, part]
@@ -235,7 +250,7 @@ class _Places:
         k = len(flat.nodes)
         middle = np.tile(flat.nodes.mean(axis=0), (len(self.x), 1))
         xi = middle, np.zeros((len(middle), 2, self.ndof))
-        slope, change = self._slopes(flat, slice(0, k), xi)
+        slope, change = self._gradient(flat, slice(0, k), xi)
         a, b = slope[:, :, 0], slope[:, :, 1]
         across = np.cross(a, b)
         moved = np.cross(change[:, :, 0], b[:, :, None], axis=1)
@@ -255,25 +270,33 @@ class _Places:
         a, b = len(self.pair.one.nodes), len(far.nodes)
         side_nodes, other_nodes = slice(0, len(flat.nodes)), slice(a, a + b)
         xi, eta = (motion[:, :2], zero), (motion[:, 6:8], zero)
-        x, y = self._place(flat, self.x, side_nodes, xi), self._place(far, self.x, other_nodes, eta)
-        K = self._slopes(flat, side_nodes, xi)[0] @ A - self._slopes(far, other_nodes, eta)[0] @ B
-        v, dv = _along(K, (y[0] - x[0], y[1] - x[1]), normal)
+        x, y = (
+            self._moving_point(flat, self.x, side_nodes, xi),
+            self._moving_point(far, self.x, other_nodes, eta),
+        )
+        K = (
+            self._gradient(flat, side_nodes, xi)[0] @ A
+            - self._gradient(far, other_nodes, eta)[0] @ B
+        )
+        v, dv = _tangential_solution(K, (y[0] - x[0], y[1] - x[1]), normal)
         at = motion[:, :2] + np.einsum("ndv,nv->nd", A, v), np.einsum("ndv,nvm->ndm", A, dv)
-        return self._place(flat, self.x, side_nodes, at)
+        return self._moving_point(flat, self.x, side_nodes, at)
 
-    def _met(self, cell: Cell, part: slice, z: _Varied, normal: _Varied) -> _Varied:
+    def _project(self, cell: Cell, part: slice, z: _Varied, normal: _Varied) -> _Varied:
         """Parent coordinates on a face of what lies on the line through z along the normal."""
         at = np.tile(cell.nodes[: cell.corners].mean(axis=0), (len(self.x), 1))
         zero = np.zeros((len(at), 2, self.ndof))
         for _ in range(_ITERATIONS):
-            point = self._held(cell, self.x[:, part], (at, zero))[0]
+            point = self._interpolate(cell, self.x[:, part], (at, zero))[0]
             K = -np.einsum("nkd,nkc->ncd", cell.gradient(at), self.x[:, part])
-            step = _solved(K, normal[0], point - z[0])[:, :2]
+            step = _solve_columns(K, normal[0], point - z[0])[:, :2]
             at = at + np.clip(step, -2.0, 2.0)
             if np.abs(step).max(initial=0.0) < 1e-14:
                 break
-        K = -self._slopes(cell, part, (at, zero))[0]
-        return at, _along(K, _minus(self._place(cell, self.x, part, (at, zero)), z), normal)[1]
+        K = -self._gradient(cell, part, (at, zero))[0]
+        return at, _tangential_solution(
+            K, _minus(self._moving_point(cell, self.x, part, (at, zero)), z), normal
+        )[1]
 
 
 def _plus(a: _Varied, b: _Varied) -> _Varied:
@@ -308,14 +331,14 @@ def _triple(a: _Varied, b: _Varied, c: _Varied) -> _Varied:
     return np.einsum("nc,nc->n", np.cross(a[0], b[0]), c[0]), sum(changes)
 
 
-def _along(K: Array, off: _Varied, normal: _Varied) -> _Varied:
+def _tangential_solution(K: Array, off: _Varied, normal: _Varied) -> _Varied:
     """v with K v + g n = off, and its derivatives where v is nearly zero."""
-    w = _solved(K, normal[0], off[0])
+    w = _solve_columns(K, normal[0], off[0])
     change = off[1] - w[:, 2, None, None] * normal[1]
-    return w[:, :2], _solved(K, normal[0], change)[:, :2]
+    return w[:, :2], _solve_columns(K, normal[0], change)[:, :2]
 
 
-def _solved(K: Array, n: Array, right: Array) -> Array:
+def _solve_columns(K: Array, n: Array, right: Array) -> Array:
     """Solution (n, 3, ...) of the columns of K (n, 3, 2) and n (n, 3); nan if any is singular."""
     matrix = np.concatenate([K, n[:, :, None]], axis=2)
     flat = right.ndim == 2
@@ -345,7 +368,7 @@ def _corners(cell: Cell) -> Cell:
     return CELLS["tri3" if cell.corners == 3 else "quad4"]
 
 
-def _rule(pair: FacePair) -> tuple[Array, Array]:
+def _rule(pair: MortarPairKernel) -> tuple[Array, Array]:
     """Exact for a uniform pressure on faces that are parallelograms, and more on triangles."""
     order = max(pair.one.order, pair.other.order)
     return CELLS["tri3"].rule(2 * order)

@@ -1,4 +1,4 @@
-"""Contact of deformable sides: the search for pairs, their elements, and a problem that has them.
+"""Contact of deformable sides: search for pairs, their elements, and the problem with contact.
 
 The elements of a pair (page `mortar_22` and its like) are zero where sides do not meet, so that
 any list of pairs that holds those that meet gives the same equations: they are functions of the
@@ -33,7 +33,7 @@ SLANTED = 2.0  # a line along the normal is at most so many times as long as the
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class ContactSide:
     """Faces of one kind, (n, k), their ends first; rho, depth, reach: (n,), see the page."""
 
     kind: str
@@ -56,7 +56,7 @@ class Contact:
     points: Array
     displacements: Integers
     multipliers: Integers
-    sides: tuple[Side, ...]
+    sides: tuple[ContactSide, ...]
     others: tuple[tuple[str, Integers], ...]
     kernels: dict[tuple[str, str], Kernel]
     friction: float = 0.0
@@ -88,10 +88,10 @@ class Contact:
         points = self.points + moved
         side_corners = np.concatenate([s.faces[:, :2] for s in self.sides])
         other_corners = np.concatenate([faces[:, :2] for _, faces in self.others])
-        candidates = facing(
+        side, other = facing(
             _balls(points[side_corners]), _balls(points[other_corners]), limits(self.sides)
         )
-        return apart(side_corners, other_corners, *candidates, alone=self.alone)
+        return without_common_corners(side_corners, other_corners, side, other, alone=self.alone)
 
     def _block(self, a: int, b: int, one: Integers, other: Integers, old: Array) -> ElementBlock:
         """Elements of sides of kind a with others of kind b."""
@@ -117,7 +117,7 @@ class Contact:
         )
 
 
-def within(tree: cKDTree, places: Array, radius: Array) -> tuple[Integers, Integers]:
+def pairs_within(tree: cKDTree, places: Array, radius: Array) -> tuple[Integers, Integers]:
     """Pairs of places (n, dim) and points of a tree that are no further apart than radius, (n,)."""
     neighbours = tree.query_ball_point(places, radius, return_sorted=True)
     one = np.repeat(np.arange(len(places)), [len(row) for row in neighbours])
@@ -129,18 +129,18 @@ Balls: TypeAlias = tuple[Array, Array, Array]
 
 
 def facing(mine: Balls, theirs: Balls, limits: tuple[Array, Array]) -> tuple[Integers, Integers]:
-    """Pairs of faces that look at each other and are near enough to meet."""
+    """Pairs of opposite faces that are near enough to come into contact."""
     (centre, radius, along), (far, size, against), (depth, reach) = mine, theirs, limits
     tree = cKDTree(far)
     nearest = SLANTED * tree.query(centre)[0]
-    one, other = within(
+    one, other = pairs_within(
         tree, centre, radius + size.max() + np.maximum(reach, np.minimum(depth, nearest))
     )
     mask = np.einsum("nc,nc->n", along[one], against[other]) < FACING
     return one[mask], other[mask]
 
 
-def apart(
+def without_common_corners(
     mine: Integers, theirs: Integers, one: Integers, other: Integers, *, alone: bool
 ) -> tuple[Integers, Integers]:
     """Pairs of faces without a corner in common; alone: both are one surface, each pair once.
@@ -154,7 +154,10 @@ def apart(
 
 
 def by_kind(
-    sides: Sequence[Side], others: Sequence[tuple[str, Integers]], one: Integers, other: Integers
+    sides: Sequence[ContactSide],
+    others: Sequence[tuple[str, Integers]],
+    one: Integers,
+    other: Integers,
 ) -> Iterator[tuple[int, int, Integers, Integers]]:
     """For each kind of side and of other: their numbers, and the pairs by numbers within them.
 
@@ -173,7 +176,7 @@ def by_kind(
         yield a, b, one[mask] - side_starts[a], other[mask] - other_starts[b]
 
 
-def limits(sides: Sequence[Side]) -> tuple[Array, Array]:
+def limits(sides: Sequence[ContactSide]) -> tuple[Array, Array]:
     """Depth and reach of the faces of all kinds."""
     depth, reach = (np.concatenate([getattr(s, n) for s in sides]) for n in ("depth", "reach"))
     return depth, reach
@@ -191,18 +194,18 @@ def _balls(ends: Array) -> Balls:
     return ends.mean(axis=1), 0.5 * length, along / np.maximum(length, 1e-300)[:, None]
 
 
-def nodes_of(sides: Sequence[Side], others: Sequence[tuple[str, Integers]]) -> Integers:
+def nodes_of(sides: Sequence[ContactSide], others: Sequence[tuple[str, Integers]]) -> Integers:
     """Nodes of the faces of all kinds, rising."""
     faces = [*(s.faces for s in sides), *(f for _, f in others)]
     return np.unique(np.concatenate([f.ravel() for f in faces]))
 
 
-def stride(sides: Sequence[Side]) -> float:
-    """Motion of an iteration that most of the sides cannot overlook."""
+def max_step(sides: Sequence[ContactSide]) -> float:
+    """Largest motion in an iteration that contact search still detects."""
     return _STRIDE * float(np.median(np.concatenate([side.depth for side in sides])))
 
 
-class Sought(Protocol):
+class StateDependentBlocks(Protocol):
     """Elements that depend on the unknowns."""
 
     @property
@@ -230,7 +233,7 @@ class Sought(Protocol):
         ...
 
     @property
-    def sides(self) -> tuple[Side, ...]:
+    def sides(self) -> tuple[ContactSide, ...]:
         """Faces with multipliers."""
         ...
 
@@ -240,14 +243,14 @@ class Sought(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class TouchingProblem(Problem):
-    """A problem with contacts, whose elements are looked for wherever it is evaluated.
+class ContactProblem(Problem):
+    """A problem with contacts, whose elements are searched at each evaluation.
 
     old: (n,) unknowns of the step before. latest: the last problem without a search; it only
     saves time. change: (n,) of the unknowns in the last iteration, empty before the first.
     """
 
-    contacts: tuple[Sought, ...] = ()
+    contacts: tuple[StateDependentBlocks, ...] = ()
     old: Array = field(default_factory=lambda: np.empty(0))
     change: Array = field(default_factory=lambda: np.empty(0), repr=False)
     latest: list[Problem] = field(default_factory=list, repr=False)
@@ -281,10 +284,10 @@ class TouchingProblem(Problem):
         for contact in self.contacts:
             moved = np.where(contact.displacements >= 0, dx[contact.displacements], 0.0)
             largest = float(np.linalg.norm(moved, axis=1).max())
-            limit = min(limit, stride(contact.sides) / max(largest, 1e-300))
+            limit = min(limit, max_step(contact.sides) / max(largest, 1e-300))
         return limit
 
-    def after(self, before: Array, x: Array) -> TouchingProblem:
+    def after(self, before: Array, x: Array) -> ContactProblem:
         """The problem as it is after a step from `before` to x, (n,)."""
         return replace(self, change=x - before)
 

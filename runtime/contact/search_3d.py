@@ -1,4 +1,4 @@
-"""Contact of faces in space: pairs that look at each other, and triangles of what they share."""
+"""Contact search in 3-D: pairs of opposite faces, and triangles of their overlap."""
 
 from __future__ import annotations
 
@@ -9,8 +9,16 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.contact.mortar_overlap import CORNER, common_part, mean_normal
-from softehl.runtime.contact.mortar_pair import MULTIPLIERS, FacePair
-from softehl.runtime.contact.search import Balls, Side, apart, by_kind, facing, limits, nodes_of
+from softehl.runtime.contact.mortar_pair import MULTIPLIERS, MortarPairKernel
+from softehl.runtime.contact.search import (
+    Balls,
+    ContactSide,
+    by_kind,
+    facing,
+    limits,
+    nodes_of,
+    without_common_corners,
+)
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.mesh.cells import CELLS
 
@@ -28,9 +36,9 @@ class FaceContact:
     points: Array
     displacements: Integers
     multipliers: Integers
-    sides: tuple[Side, ...]
+    sides: tuple[ContactSide, ...]
     others: tuple[tuple[str, Integers], ...]
-    kernels: dict[tuple[str, str], FacePair]
+    kernels: dict[tuple[str, str], MortarPairKernel]
     friction: float = 0.0
     alone: bool = False
 
@@ -63,8 +71,10 @@ class FaceContact:
     def _pairs(self, places: Array) -> tuple[Integers, Integers]:
         """Numbers of sides and of others, both counted through their kinds, that may meet."""
         sides = [(s.kind, s.faces) for s in self.sides]
-        candidates = facing(_balls(places, sides), _balls(places, self.others), limits(self.sides))
-        return apart(_corners(sides), _corners(self.others), *candidates, alone=self.alone)
+        side, other = facing(_balls(places, sides), _balls(places, self.others), limits(self.sides))
+        return without_common_corners(
+            _corners(sides), _corners(self.others), side, other, alone=self.alone
+        )
 
     def _block(
         self, a: int, b: int, found: tuple[Integers, Integers, Array], old: Array

@@ -17,7 +17,7 @@ from softehl.runtime.discretisation.dofmap import Slot, slots
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.kernels.kernel_call import Rule
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.interior_facets import beside, interior
+from softehl.runtime.mesh.interior_facets import cells_at_side, interior
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.suggestions import listed
 
@@ -78,7 +78,7 @@ def elements_of(mesh: Mesh, name: str, kernel: Kernel, on: On, cells: str | None
         )
     if facet:
         assert on is not None
-        nodes = interior(mesh, stem) if facet == "interior" else beside(mesh, on, stem)
+        nodes = interior(mesh, stem) if facet == "interior" else cells_at_side(mesh, on, stem)
         return CELLS[stem].side_nodes[0][0].name, nodes
     there = _faces(mesh, on, kernel) if on is not None else mesh.cells_of(cells)
     if kernel.cell in there:

@@ -321,7 +321,7 @@ class Assembler:
         """
         for block in self.blocks:
             if block.name in parameters:
-                message = not_finite(block, *block.tangent(x, parameters[block.name]))
+                message = not_finite(block, block.tangent(x, parameters[block.name]))
                 if message:
                     return message
         return ""

@@ -21,7 +21,7 @@ from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.discretisation.loads import Tie
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.discretisation.problem_checks import ProblemError
-from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.linear.linear_solver import Factors
 
 SYMMETRIC = 1e-8
@@ -126,7 +126,7 @@ def _spread(blocks: Array, numbers: Integers, n: int) -> csr_array:
 
 
 def internal_negative(problem: Problem, K: csc_array) -> int:
-    """Number of negative eigenvalues that internal unknowns of elements have by themselves."""
+    """Number of negative eigenvalues of the blocks of internal unknowns."""
     blocks = [_blocks(K, numbers) for numbers in _internal_dofs(problem)]
     return sum(int((np.linalg.eigvalsh(b) < 0.0).sum()) for b in blocks)
 
@@ -196,12 +196,12 @@ def _written(problem: Problem) -> Integers:
 
 
 def is_symmetric(K: csc_array) -> bool:
-    """True if K is its transpose but for rounding."""
+    """True if K is symmetric but for rounding."""
     return _largest(K - K.T) <= SYMMETRIC * _largest(K)
 
 
 def is_symmetric_where_free(problem: Problem, K: csc_array) -> bool:
-    """True if K is its transpose but for rounding, for changes that supports and ties admit.
+    """True if K is symmetric but for rounding, for changes that supports and ties admit.
 
     K: before supports are eliminated. A pressure that follows a side which ends at supports has a
     tangent that is not symmetric in the prescribed unknowns only.
@@ -223,27 +223,27 @@ def _largest(K: csc_array) -> float:
 class LevelConstraints:
     """Constraints of the unknowns of a level of multigrid: T, unknown by unknown.
 
-    moving: (n,) whether an unknown is one of z. behind: (k,) places of those that follow, and
-    ahead: (k,) of those that they follow.
+    moving: (n,) whether an unknown is one of z. slaves: (k,) places of those that follow, and
+    masters: (k,) of those that they follow.
     """
 
     moving: Flags
-    behind: Integers
-    ahead: Integers
+    slaves: Integers
+    masters: Integers
 
     def spread(self, x: Array) -> None:
         """T x in place: those behind take the value of those ahead."""
-        x[self.behind] = x[self.ahead]
+        x[self.slaves] = x[self.masters]
 
     def gather(self, y: Array) -> None:
         """T' y in place: those ahead take the sum."""
-        np.add.at(y, self.ahead, y[self.behind])
+        np.add.at(y, self.masters, y[self.slaves])
 
     @property
     def matrix(self) -> csr_array:
         """T, (n, n), of zeros and ones; columns of unknowns that are none of z are empty."""
         masters = np.flatnonzero(self.moving)
-        rows, columns = np.append(masters, self.behind), np.append(masters, self.ahead)
+        rows, columns = np.append(masters, self.slaves), np.append(masters, self.masters)
         n = len(self.moving)
         return csr_array(coo_array((np.ones(len(rows)), (rows, columns)), (n, n)))
 
@@ -252,12 +252,12 @@ class LevelConstraints:
 class Ties:
     """All ties of a problem, maybe none.
 
-    whole: (n, n) their part of the tangent. equations: B, (k, n), without prescribed unknowns, and
+    matrix: (n, n) their part of the tangent. equations: B, (k, n), without prescribed unknowns, and
     normal: factors of B B'. forces: (k,) numbers of the forces. free: (n,) whether an unknown
     moves: it is no force, not prescribed, and tied to none that is. follows: of every level.
     """
 
-    whole: csr_array
+    matrix: csr_array
     equations: csr_array
     normal: Factors | None
     forces: Integers
@@ -282,7 +282,9 @@ class Ties:
         coupling = csr_array((ones, (forces, np.arange(k))), shape=(n, k)) @ B
         free_equations = csr_array(B.multiply(free.astype(np.float64)[None]))
         normal = (
-            choose("auto").factorise(csc_array(free_equations @ free_equations.T)) if k else None
+            direct_solver("auto").factorise(csc_array(free_equations @ free_equations.T))
+            if k
+            else None
         )
         groups = tied_groups(a, b, n)
         group_fixed = np.zeros(n, dtype=bool)
@@ -298,7 +300,7 @@ class Ties:
         return np.asarray(self.equations.T @ self.normal.solve(r[self.forces]))
 
     def put_forces(self, x: Array, left: Array) -> None:
-        """Put into x the forces f of B' f = left, (n,), as well as they can."""
+        """Put into x the forces f of B' f = left, (n,), in the sense of least squares."""
         if self.normal is not None:
             x[self.forces] = self.normal.solve(self.equations @ left)
 
@@ -310,7 +312,7 @@ def tied_groups(a: Integers, b: Integers, n: int) -> Integers:
 
 
 def _follow(free: Flags, groups: Integers) -> LevelConstraints:
-    """The first unknown of each group goes ahead of those that are there."""
+    """Constraints of a level: the first free unknown of each group is the master."""
     _, first, inverse = np.unique(groups, return_index=True, return_inverse=True)
     masters = first[inverse]
     slaves = np.flatnonzero(free & (masters != np.arange(len(free))))

@@ -1,4 +1,4 @@
-"""Forces averaged along the way of a step, whose work is the change of an energy.
+"""Discrete gradient: mean forces along a step, whose work is the change of the energy.
 
 The mean-value discrete gradient (Harten, Lax and van Leer; "average vector field"):
 
@@ -26,7 +26,7 @@ ten periods of 40 steps; with two points to 1e-6, and a step costs little less."
 
 
 @dataclass(frozen=True, eq=False)
-class Averaged:
+class DiscreteGradientKernel:
     """A kernel at the points of a step from unknowns `old`, which are the last columns of its data.
 
     timed: (number of a parameter, columns of data, unknowns that they belong to): coefficient c and
@@ -110,7 +110,7 @@ def with_old(block: ElementBlock, old: Array) -> ElementBlock:
 def time_derivatives(
     kernel: Any, filled: Sequence[tuple[str, dict[str, int]]]
 ) -> tuple[tuple[int, Integers, Integers], ...]:
-    """See `Averaged.timed`: of parameters, with a table from data to unknowns each."""
+    """See `timed` of the kernel: of parameters, with a table from data to unknowns each."""
     derivatives = []
     for parameter, table in filled:
         if parameter in kernel.parameters:

@@ -173,7 +173,7 @@ def separate_dofs(segments: int, order: int, first: int) -> Integers:
 
 
 def gather_rows(*parts: Integers) -> Integers:
-    """Element dof map (n, ndof) from maps that stand side by side; each (n, k) or (n,)."""
+    """Element dof map (n, ndof) from maps side by side; each (n, k) or (n,)."""
     columns: Sequence[Integers] = [p[:, None] if p.ndim == 1 else p for p in parts]
     return np.ascontiguousarray(np.concatenate(columns, axis=1))
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.discretisation.mass import Mass
+from softehl.runtime.discretisation.mass import MassKernel
 from softehl.runtime.kernels.kernel import Kernel, Rule
 
 Again: TypeAlias = Callable[[Array, Array, Array | None], None]
@@ -216,7 +216,7 @@ class ElementBlock:
             history = None if self.point_data is None else self.point_data[part]
             coordinates, dofs = self.coordinates[part], self.dofs[part]
             piece = replace(self, coordinates=coordinates, dofs=dofs, data=data, point_data=history)
-            if isinstance(self.kernel, Mass):
+            if isinstance(self.kernel, MassKernel):
                 piece = replace(piece, kernel=self.kernel.part(part))
             yield piece, scatter[width * first : width * (first + step)]
 

@@ -1,4 +1,4 @@
-"""Loads, pressures, springs and ties as element kernels: what a problem has besides its pages."""
+"""Loads, pressures, springs and ties as element kernels."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def interpolation(kind: str, nodes: int) -> Cell:
 
 
 @dataclass(frozen=True, eq=False)
-class Mass:
+class MassKernel:
     """Inertia of elements as a kernel: m (c u + rest), c being its parameter.
 
     Unknowns (n, components k), component by component. matrices: (n, k, k). Its data are rest, of
@@ -79,9 +79,9 @@ class Mass:
     parameters = (PARAMETER,)
     fields: tuple[str, ...] = ()
 
-    def part(self, rows: slice) -> Mass:
+    def part(self, rows: slice) -> MassKernel:
         """Of some of the elements."""
-        return Mass(self.matrices[rows], self.components)
+        return MassKernel(self.matrices[rows], self.components)
 
     def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Virtual work of inertia, (n, components k)."""

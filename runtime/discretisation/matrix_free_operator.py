@@ -1,4 +1,4 @@
-"""A tangent that is no matrix, and its solution by Krylov's methods with multigrid."""
+"""Matrix-free tangent, and its solution by Krylov methods with multigrid."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.discretisation.constraints import Ties
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Tie
-from softehl.runtime.discretisation.matrix_free_products import Product
-from softehl.runtime.discretisation.p_multigrid import Levels
+from softehl.runtime.discretisation.matrix_free_products import ElementProduct
+from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.linear.coarse_grid_solver import coarse_solver
 from softehl.runtime.solve.linear.krylov import conjugate_gradients, minimal_residuals
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
-from softehl.runtime.solve.linear.multigrid import Level, Multigrid
+from softehl.runtime.solve.linear.multigrid import MultigridCycle, MultigridLevel
 
 
 @dataclass(frozen=True, eq=False)
-class Iteration:
+class KrylovSettings:
     """Tolerance of the residual, relative to the right-hand side; iterations at most; counts of all
     solutions so far.
     """
 
     tolerance: float
-    most: int
+    max_iterations: int
     counts: list[int] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
-class Tangent:
+class MatrixFreeOperator:
     """The tangent at a state: products of pages, a matrix of loads and springs, and multigrid.
 
     rest: matrix of loads and springs, node by node as the first level has it. diagonals: of K,
@@ -42,9 +42,9 @@ class Tangent:
     """
 
     problem: Problem
-    levels: Levels
-    iteration: Iteration
-    products: tuple[Product, ...]
+    levels: MultigridLevels
+    iteration: KrylovSettings
+    products: tuple[ElementProduct, ...]
     rest: csr_array
     diagonals: Array
     ties: Ties
@@ -54,8 +54,13 @@ class Tangent:
 
     @classmethod
     def of(
-        cls, problem: Problem, levels: Levels, iteration: Iteration, ties: Ties, x: Array
-    ) -> Tangent:
+        cls,
+        problem: Problem,
+        levels: MultigridLevels,
+        iteration: KrylovSettings,
+        ties: Ties,
+        x: Array,
+    ) -> MatrixFreeOperator:
         """At x, (n,)."""
         products, diagonal, loads_matrix = [], np.zeros(len(x)), csr_array((len(x), len(x)))
         count = levels.steps[0].shape[1]
@@ -64,8 +69,10 @@ class Tangent:
             parameters = problem.parameters.get(block.name)
             if parameters is None or not len(block.dofs) or isinstance(block.kernel, Tie):
                 continue
-            if block.name in levels.places:
-                products.append(Product.of(block, x, parameters, levels.places[block.name]))
+            if block.name in levels.numberings:
+                products.append(
+                    ElementProduct.of(block, x, parameters, levels.numberings[block.name])
+                )
                 lower = lower + _projected(block, x, parameters, levels, ties.free, diagonal)
             else:
                 tangents = block.tangent(x, parameters)[1]
@@ -77,15 +84,25 @@ class Tangent:
             P = without(levels.steps[0], ties.free[order])
             lower = lower + P.T @ loads_matrix @ P
         T = ties.follows[1].matrix
-        found = csr_array(loads_matrix), diagonal, ties, csr_array(T.T @ lower @ T)
-        numbering = next(iter(levels.places.values()))
+        numbering = next(iter(levels.numberings.values()))
         constrained = np.flatnonzero(~ties.follows[0].moving)
         work = numbering.vector(), numbering.vector()
-        return cls(problem, levels, iteration, tuple(products), *found, constrained, work)
+        return cls(
+            problem=problem,
+            levels=levels,
+            iteration=iteration,
+            products=tuple(products),
+            rest=csr_array(loads_matrix),
+            diagonals=diagonal,
+            ties=ties,
+            lower=csr_array(T.T @ lower @ T),
+            held=constrained,
+            work=work,
+        )
 
     def times(self, v: Array) -> Array:
         """K v, prescribed unknowns included."""
-        return np.asarray(self._untied(v) + self.ties.whole @ v)
+        return np.asarray(self._untied(v) + self.ties.matrix @ v)
 
     def _untied(self, v: Array) -> Array:
         """K v without ties."""
@@ -108,7 +125,7 @@ class Tangent:
         return target[:n]
 
     def apply(self, v: Array) -> Array:
-        """T' K T v node by node, with ones for what does not move by itself."""
+        """T' K T v node by node, with ones for constrained unknowns."""
         source, target = self.work
         x, follow = source[: len(v)], self.ties.follows[0]
         x[:] = v
@@ -139,7 +156,7 @@ class Tangent:
         """See `JudgesSingularity`: iterations that converged show that the matrix is regular."""
 
     def solve(self, r: Array) -> Array:
-        """x of K x = r.  Raises SingularMatrix where the iteration does not get there."""
+        """x of K x = r.  Raises SingularMatrix if the iteration does not converge."""
         order, ties, follow = self.levels.unknowns[0], self.ties, self.ties.follows[0]
         fixed, tied = self.problem.fixed, len(self.ties.forces) > 0
         x = ties.shift(r)
@@ -155,10 +172,10 @@ class Tangent:
         return x
 
     def _iterated(self, b: Array) -> Array:
-        """z of T' K T z = b, node by node; zero for what does not move by itself."""
+        """z of T' K T z = b, node by node; zero for constrained unknowns."""
         settings, cycle = self.iteration, self._multigrid()
         method = conjugate_gradients if self.is_symmetric() else minimal_residuals
-        result = method(self.apply, cycle, b, settings.tolerance, settings.most)
+        result = method(self.apply, cycle, b, settings.tolerance, settings.max_iterations)
         settings.counts.append(result.iterations)
         # up to a negative curvature it is a direction of descent, which Newton's method may take
         if not (result.converged or result.negative) or not np.isfinite(result.x).all():
@@ -175,47 +192,52 @@ class Tangent:
         size = np.linalg.norm(u) * np.linalg.norm(Kv)
         return bool(abs(u @ Kv - v @ Ku) <= 1e-10 * size)
 
-    def _multigrid(self) -> Multigrid:
+    def _multigrid(self) -> MultigridCycle:
         levels, follows = self.levels, self.ties.follows
         diagonal = self.diagonals[levels.unknowns[0]]
         if not np.isfinite(diagonal).all():
             raise SingularMatrix("the tangent has entries that are not finite")
         follows[0].gather(diagonal)
         diagonal[self.held] = 1.0
-        multigrid_levels, matrix = list[Level](), self.lower
+        multigrid_levels, matrix = list[MultigridLevel](), self.lower
         for step, (upper, lower) in zip(levels.steps, pairwise(follows), strict=True):
             P = without(step, upper.moving) @ lower.matrix
             if not multigrid_levels:
-                multigrid_levels.append(Level.of(self.apply, diagonal, P))
+                multigrid_levels.append(MultigridLevel.of(self.apply, diagonal, P))
                 continue
             A = _with_ones(matrix, upper.moving)
-            multigrid_levels.append(Level.of(A.__matmul__, A.diagonal(), P))
+            multigrid_levels.append(MultigridLevel.of(A.__matmul__, A.diagonal(), P))
             matrix = csr_array(P.T @ matrix @ P)
         moving = follows[-1].moving
-        near = np.where(moving[:, None], levels.near, 0.0)
+        near = np.where(moving[:, None], levels.nullspace, 0.0)
         lowest = coarse_solver(_with_ones(matrix, moving), near, levels.components)
-        return Multigrid(multigrid_levels, lowest)
+        return MultigridCycle(multigrid_levels, lowest)
 
 
 @dataclass(frozen=True, eq=False)
 class _Bound:
     """A bound of |K|: |K_ij| <= sqrt(K_ii K_jj) inside every element."""
 
-    tangent: Tangent
+    tangent: MatrixFreeOperator
 
     def __matmul__(self, x: Array) -> Array:
         problem = self.tangent.problem
         root = np.sqrt(np.abs(self.tangent.diagonals))
         root[problem.fixed] = 0.0
         around = problem.assembler.around(root * x, problem.parameters)
-        return np.asarray(root * around + abs(self.tangent.ties.whole) @ x)
+        return np.asarray(root * around + abs(self.tangent.ties.matrix) @ x)
 
 
 def _projected(
-    block: ElementBlock, x: Array, parameters: Array, levels: Levels, free: Flags, diagonal: Array
+    block: ElementBlock,
+    x: Array,
+    parameters: Array,
+    levels: MultigridLevels,
+    free: Flags,
+    diagonal: Array,
 ) -> csr_array:
     """The matrix at the lower order, and the diagonal of K, from the tangents of elements."""
-    P, dofs = levels.transfers[block.name].whole(), levels.lower[block.name]
+    P, dofs = levels.transfers[block.name].matrix(), levels.lower[block.name]
     projected, at = np.empty((len(dofs), P.shape[1], P.shape[1])), 0
     for piece, _ in block.pieces(np.empty(0, dtype=np.int64)):
         tangents = piece.tangent(x, parameters)[1]
@@ -237,7 +259,7 @@ def _matrix(dofs: Integers, tangents: Array, size: int) -> csr_array:
 
 
 def without(step: csr_array, moving: Flags) -> csr_array:
-    """Interpolation to what moves: without other rows."""
+    """Interpolation with the rows of constrained unknowns set to zero."""
     return csr_array(step.multiply(moving.astype(np.float64)[:, None]))
 
 

@@ -58,7 +58,7 @@ def threads() -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class ElementNumbering:
     """Places of the elements of a block, whatever their state.
 
     order: (m,) elements in groups, some twice to fill up a group. index: (groups, nodes, GROUP)
@@ -77,7 +77,9 @@ class Places:
     rest: tuple[int, int]
 
     @classmethod
-    def of(cls, block: ElementBlock, count: int, numbers: Integers | None = None) -> Places:
+    def of(
+        cls, block: ElementBlock, count: int, numbers: Integers | None = None
+    ) -> ElementNumbering:
         """For so many threads.
 
         numbers: places of all unknowns of the system; None: the block has vectors of its own.
@@ -155,20 +157,22 @@ def lexicographic(cell: Cell) -> list[int]:
 
 
 @dataclass(eq=False)
-class Product:
+class ElementProduct:
     """The tangent of a block at a state, as a function of a vector.
 
     kept: (m, points, numbers) in the order of the C function.
     """
 
-    places: Places
+    places: ElementNumbering
     action: Action
     kept: Array
     parameters: Array
     _pool: ThreadPoolExecutor | None = field(init=False)
 
     @classmethod
-    def of(cls, block: ElementBlock, x: Array, parameters: Array, places: Places) -> Product:
+    def of(
+        cls, block: ElementBlock, x: Array, parameters: Array, places: ElementNumbering
+    ) -> ElementProduct:
         """At the vector x of the whole system."""
         kernel = require_product(block)
         points, m = len(kernel.default_rule.weights), len(places.order)
@@ -189,13 +193,13 @@ class Product:
         self._pool = ThreadPoolExecutor(len(self.places.runs)) if several else None
 
     def __call__(self, x: Array, y: Array) -> None:
-        """y += K x for vectors as `Places.vector` makes them."""
-        arguments = self.parameters, self.kept
+        """y += K x for vectors as `ElementNumbering.vector` makes them."""
+        parameters, cached, index = self.parameters, self.kept, self.places.index
 
         def run(span: tuple[int, int]) -> None:
             first, last = span
             if last > first:
-                self.action(span, *arguments, self.places.index, x, y)
+                self.action(span, parameters, cached, index, x, y)
 
         if self._pool is None:
             run((0, len(self.places.order)))

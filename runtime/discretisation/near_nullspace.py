@@ -1,4 +1,4 @@
-"""Motions that a free body hardly resists, which multigrid must keep."""
+"""Near null space of a free body, which multigrid must keep."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def is_vector(names: Sequence[str], dimension: int) -> bool:
     return len(stems) == 1 and axes == "xyz"[:dimension]
 
 
-def motions(places: Array, names: Sequence[str]) -> Array:
-    """Shifts of each unknown at places (n, dim), and rotations where they are displacements.
+def rigid_body_modes(points: Array, names: Sequence[str]) -> Array:
+    """Translations of each unknown at points (n, dim), and rotations of displacements.
 
     (n len(names), k), node by node, of size 1.
     """
-    n, dim = places.shape
-    offsets = places - places.mean(axis=0)
+    n, dim = points.shape
+    offsets = points - points.mean(axis=0)
     offsets /= float(np.abs(offsets).max(initial=0.0)) or 1.0
     turned = is_vector(names, dim)
     pairs = [(i, j) for i in range(dim) for j in range(i)] if turned else []

@@ -15,11 +15,11 @@ from scipy.sparse import csr_array
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.matrix_free_products import (
-    Places,
+    ElementNumbering,
     by_components,
     require_product,
 )
-from softehl.runtime.discretisation.near_nullspace import motions
+from softehl.runtime.discretisation.near_nullspace import rigid_body_modes
 from softehl.runtime.mesh.cells import CELLS, Cell
 
 LOWER = {2: 1, 3: 1, 4: 2, 5: 1, 6: 2}
@@ -33,7 +33,7 @@ def cell_of(cell: Cell, order: int) -> Cell:
 
 
 @dataclass(frozen=True, eq=False)
-class Transfer:
+class OrderTransfer:
     """Elements of a block at a lower order.
 
     local: (nodes, lower nodes) values of the lower shape functions at the nodes. inside: numbers of
@@ -45,7 +45,7 @@ class Transfer:
     columns: Integers
 
     @classmethod
-    def of(cls, block: ElementBlock, order: int) -> Transfer:
+    def of(cls, block: ElementBlock, order: int) -> OrderTransfer:
         """To a lower order."""
         kernel = require_product(block)
         cell = CELLS[kernel.cell]
@@ -57,7 +57,7 @@ class Transfer:
         """Unknowns (n, lower nodes, components) of the lower order, by their numbers."""
         return np.asarray(block.dofs[:, self.columns[self.inside]])
 
-    def whole(self) -> Array:
+    def matrix(self) -> Array:
         """Interpolation (unknowns, lower unknowns) of an element, components running first."""
         components = self.columns.shape[1]
         matrix = np.zeros((self.columns.size, self.local.shape[1] * components))
@@ -84,22 +84,22 @@ def interpolation(
 
 
 @dataclass(frozen=True, eq=False)
-class Levels:
+class MultigridLevels:
     """Places of elements and levels of lower order, which all states share.
 
-    places: of the elements of a block. transfers: to the first lower order, and lower: unknowns
+    numberings: of the elements of a block. transfers: to the first lower order, and lower: unknowns
     (n, k) of the elements there. unknowns: of every level by their numbers in the system; those of
     a node are neighbours. steps: interpolation to each level from the next.
-    components: unknowns of a node. near: (m, k) motions that the lowest level hardly resists.
+    components: unknowns of a node. nullspace: (m, k) motions that the lowest level hardly resists.
     """
 
-    places: dict[str, Places]
-    transfers: dict[str, Transfer]
+    numberings: dict[str, ElementNumbering]
+    transfers: dict[str, OrderTransfer]
     lower: dict[str, Integers]
     unknowns: tuple[Integers, ...]
     steps: tuple[csr_array, ...]
     components: int
-    near: Array
+    nullspace: Array
 
     @classmethod
     def of(
@@ -111,7 +111,7 @@ class Levels:
         order: int,
         size: int,
         threads: int,
-    ) -> Levels:
+    ) -> MultigridLevels:
         """Levels for blocks of cells of an order.
 
         points: (n, dim) nodes. dofmap: name -> (n,) unknowns at the nodes. size: of all unknowns.
@@ -127,7 +127,7 @@ class Levels:
         unknowns = [numbers]
         steps: list[csr_array] = []
         for upper, now in pairwise(orders):
-            lower_dofs = {b.name: Transfer.of(b, now).lower_dofs(b) for b in pages}
+            lower_dofs = {b.name: OrderTransfer.of(b, now).lower_dofs(b) for b in pages}
             first = np.concatenate([d[:, :, 0].ravel() for d in lower_dofs.values()])
             at = np.flatnonzero(np.isin(nodal[0], first))
             level_unknowns = np.stack([numbers[at] for numbers in nodal], axis=1).ravel()
@@ -139,9 +139,9 @@ class Levels:
             ]
             steps.append(interpolation(pairs, len(unknowns[-1]), len(level_unknowns)))
             unknowns.append(level_unknowns)
-        element_numbering = {b.name: Places.of(b, threads, position) for b in pages}
-        transfers = {b.name: Transfer.of(b, orders[1]) for b in pages}
-        nullspace = motions(points[at], names)
+        element_numbering = {b.name: ElementNumbering.of(b, threads, position) for b in pages}
+        transfers = {b.name: OrderTransfer.of(b, orders[1]) for b in pages}
+        nullspace = rigid_body_modes(points[at], names)
         return cls(
             element_numbering, transfers, dofs[1], (*unknowns,), (*steps,), len(names), nullspace
         )
@@ -164,7 +164,7 @@ def _inverse(numbers: Integers, size: int) -> Integers:
 def _element(block: ElementBlock, upper: int, lower: int, *, whole: bool) -> Array:
     """Interpolation of an element; whole: to its unknowns in the order of the kernel."""
     if whole:
-        return Transfer.of(block, lower).whole()
+        return OrderTransfer.of(block, lower).matrix()
     kernel = require_product(block)
     cell, components = CELLS[kernel.cell], len(kernel.unknowns) // kernel.nodes
     local = cell_of(cell, lower).shape(cell_of(cell, upper).nodes)

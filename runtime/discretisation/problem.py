@@ -25,7 +25,13 @@ from softehl.runtime.discretisation.problem_checks import (
     require_known,
     unknown_name,
 )
-from softehl.runtime.discretisation.residual_norm import ROUNDING, Balance, hides, is_far, size
+from softehl.runtime.discretisation.residual_norm import (
+    ROUNDING,
+    ResidualBalance,
+    hides,
+    is_far,
+    residual_norm,
+)
 from softehl.runtime.discretisation.step_bounds import Guard
 from softehl.runtime.suggestions import few, listed
 
@@ -339,8 +345,8 @@ class Problem:
         target[self.fixed] = self.values
         deviation, extent = x - target, np.maximum(np.abs(x), np.abs(target))
         met = ~free | (self.assembler.counts(self.parameters) > 1)
-        balance = Balance(defect, forces, terms, met, deviation, extent)
-        norm = size(balance.squares(self.layout.fields), balance.worst())
+        balance = ResidualBalance(defect, forces, terms, met, deviation, extent)
+        norm = residual_norm(balance.squares(self.layout.fields), balance.worst())
         return max(norm, self._by_scales(defect))
 
     def merit(self, x: Array) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +20,7 @@ _CELLS = {(cell.dimension, len(cell.nodes)): cell for cell in CELLS.values()}
 
 
 class ProblemError(SoftehlError, ValueError):
-    """A problem cannot be posed; the message names what was given and what is allowed."""
+    """Error: a problem cannot be posed; the message gives the value and the allowed ones."""
 
 
 def require_known(what: str, given: Iterable[str], known: Iterable[str]) -> None:
@@ -142,16 +142,16 @@ def _shown(place: Array) -> str:
     return "(" + ", ".join(f"{value:.4g}" for value in place) + ")"
 
 
-def not_finite(block: ElementBlock, *results: Array) -> str:
+def not_finite(block: ElementBlock, results: Sequence[Array]) -> str:
     """The first element of a block with a result, (n, ...), that is not finite; empty if none."""
-    invalid = rows_not_finite(*results)
+    invalid = rows_not_finite(results)
     if not len(invalid):
         return ""
     more = f" and {len(invalid) - 1} more" if len(invalid) > 1 else ""
     return element_name(block, int(invalid[0])) + more
 
 
-def rows_not_finite(*results: Array) -> Integers:
+def rows_not_finite(results: Sequence[Array]) -> Integers:
     """Numbers of the elements that have a result, (n, ...), that is not finite."""
     invalid: Flags = np.zeros(len(results[0]), dtype=bool)
     for result in results:

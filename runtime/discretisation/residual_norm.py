@@ -30,21 +30,21 @@ _SWAMPED = 1e-3  # of the loads and internal forces: rounding beyond that decide
 
 
 @dataclass(frozen=True, eq=False)
-class Balance:
-    """Residuals and what they are made of, each (n,).
+class ResidualBalance:
+    """Residuals and their terms, each (n,).
 
     defect: size of the residuals, 0 where the unknown is prescribed. forces: sums of the sizes of
     what elements contribute. terms: of the tangent's entries times the unknowns, 0 if no tangent is
     known. met: whether several elements contribute or the unknown is prescribed, so that `forces`
-    is more than the residual's own size. off: prescribed unknowns less their values, and extent:
-    the larger of both.
+    is more than the residual's own size. deviation: prescribed unknowns less their values, and
+    extent: the larger of both.
     """
 
     defect: Array
     forces: Array
     terms: Array
     met: Flags
-    off: Array
+    deviation: Array
     extent: Array
 
     def worst(self) -> float:
@@ -61,13 +61,13 @@ class Balance:
             np.where(self.met, self.forces, 0.0),
             self.forces + self.terms,
             self.terms,
-            self.off,
+            self.deviation,
             self.extent,
         )
         return np.array([[float(c[f] @ c[f]) for c in columns] for f in fields])
 
 
-def size(squares: Array, worst: float) -> float:
+def residual_norm(squares: Array, worst: float) -> float:
     """The number, from the sums of squares of all fields and the worst equation."""
     ratios = [worst]
     for defect, forces, every, terms, deviation, extent in np.sqrt(squares).tolist():
@@ -76,11 +76,11 @@ def size(squares: Array, worst: float) -> float:
     return float(max(ratios))
 
 
-def is_far(largest: float, known: float) -> bool:
+def is_far(largest: float, reference: float) -> bool:
     """True if the largest unknown is far beyond the known ones: if a body floats, a tangent that
     rounding alone keeps regular moves it by any amount.
     """
-    return largest > _FAR * known > 0.0
+    return largest > _FAR * reference > 0.0
 
 
 def hides(noise: float, size: float) -> bool:

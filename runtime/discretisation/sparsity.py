@@ -1,4 +1,4 @@
-"""Which entries of a sparse matrix elements contribute to, and where each contribution goes."""
+"""Sparsity pattern of assembled matrices, and the position of every element entry in it."""
 
 from __future__ import annotations
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.contact.body_thickness import inner_radii, thickness
-from softehl.runtime.contact.mortar_pair import FacePair
-from softehl.runtime.contact.search import Contact, Side, Sought
+from softehl.runtime.contact.mortar_pair import MortarPairKernel
+from softehl.runtime.contact.search import Contact, ContactSide, StateDependentBlocks
 from softehl.runtime.contact.search_3d import FaceContact
 from softehl.runtime.definition.contact_sides import MULTIPLIERS, Touch
 from softehl.runtime.definition.problem_definition import Statement, StudyError
@@ -46,7 +46,7 @@ def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> AnyC
         depth = np.minimum(depth, float(np.ptp(mesh.points, axis=0).max()))
         if touch.depth is not None:
             depth = np.full(len(reach), touch.depth)
-        sides.append(Side(block.kind, block.nodes, np.ones(len(reach)), depth, reach))
+        sides.append(ContactSide(block.kind, block.nodes, np.ones(len(reach)), depth, reach))
     kinds = [(s.kind, other) for s in sides for other, _ in touch.others]
     unknowns = [touch.unknown(m) for m in MULTIPLIERS[mesh.dimension]]
     given = (
@@ -59,7 +59,7 @@ def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> AnyC
     )
     if mesh.dimension == 3:
         law = load_kernel("touch")
-        pairs = {(a, b): FacePair(law, CELLS[a], CELLS[b]) for a, b in kinds}
+        pairs = {(a, b): MortarPairKernel(law, CELLS[a], CELLS[b]) for a, b in kinds}
         return FaceContact(*given, pairs, touch.friction, touch.alone)
     nodes = {kind: len(CELLS[kind].nodes) for pair in kinds for kind in pair}
     kernels = {(a, b): load_kernel(f"mortar_{nodes[a]}{nodes[b]}") for a, b in kinds}
@@ -112,7 +112,9 @@ def contact_blocks(system: System) -> dict[str, float]:
     return {**found, **pairs}
 
 
-def weighted(system: System, weight: float) -> tuple[tuple[Sought, ...], dict[str, ElementBlock]]:
+def weighted(
+    system: System, weight: float
+) -> tuple[tuple[StateDependentBlocks, ...], dict[str, ElementBlock]]:
     """Contacts and the blocks of their sides by name with a stiffness times `weight`.
 
     Their unknowns times the same number then have forces times this number and the same gaps.
@@ -131,7 +133,7 @@ def weighted(system: System, weight: float) -> tuple[tuple[Sought, ...], dict[st
     return tuple(contacts), blocks
 
 
-def _rho(system: System, touch: Touch, contact: AnyContact, side: Side, K: Array) -> Array:
+def _rho(system: System, touch: Touch, contact: AnyContact, side: ContactSide, K: Array) -> Array:
     """Stiffness per area, (n,), about that of the softer of the two bodies beneath a side."""
     if touch.stiffness is not None:
         return np.full(len(side.faces), touch.stiffness)

@@ -36,18 +36,18 @@ class SymmetricTangent:
         That of a contact without friction is symmetric but for the error of its mesh, which changes
         eigenvalues in the second order.
         """
-        share = system.share
-        problem = share.part(posed).at(x)
+        comm = system.comm
+        problem = comm.local_problem(posed).at(x)
         with np.errstate(all="ignore"):
             K = problem.assembler.linearise(x, problem.parameters)[1]
-        if share.largest(float(not np.isfinite(K.data).all())):
+        if comm.max(float(not np.isfinite(K.data).all())):
             raise StudyError(f"{words}: the tangent is not finite")
         smooth = [name for name, friction in contact_blocks(system).items() if friction == 0.0]
         whole = K
         if smooth:
             rest = {n: v for n, v in problem.parameters.items() if n not in smooth}
             whole = problem.assembler.linearise(x, rest)[1]
-        if share.largest(float(not is_symmetric_where_free(problem, whole))):
+        if comm.max(float(not is_symmetric_where_free(problem, whole))):
             raise StudyError(
                 f"{words}: the tangent is not symmetric (friction, pressure that follows an open "
                 "side, or a page without a potential), and frequencies are those of a potential"
@@ -64,7 +64,7 @@ def natural_modes(
     here = SymmetricTangent.at(system, posed, x, words)
     M = mass_matrix(system, here.problem, x, mass)
     try:
-        return system.share.lowest(here.problem, here.K, M, count)
+        return system.comm.lowest_modes(here.problem, here.K, M, count)
     except (NoModes, SingularMatrix) as error:
         raise StudyError(f"{words}: {error}") from None
 

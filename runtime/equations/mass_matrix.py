@@ -13,7 +13,7 @@ from softehl.runtime.definition.argument_checks import datum, known
 from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.element_blocks import ElementBlock
-from softehl.runtime.discretisation.mass import PARAMETER, Mass, interpolation, mass_matrices
+from softehl.runtime.discretisation.mass import PARAMETER, MassKernel, interpolation, mass_matrices
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.cells import CELLS
@@ -72,7 +72,7 @@ def _elements(system: System, block: Block, values: Mapping[str, Any]) -> Elemen
     nodes = block.nodes[:, :count]
     centres = system.mesh.points[system.everywhere.blocks[block.name].nodes].mean(axis=1)
     every = datum(f"mass of {block.name}", "rho", values["rho"], centres)
-    density = system.share.own_cells(block.name, every)
+    density = system.comm.restrict_cells(block.name, every)
     if (every < 0.0).any():
         raise StudyError(f"mass of {block.name!r}: rho = {every.min():g}, it cannot be negative")
     ring = system.statement is not None and system.statement.ring
@@ -80,7 +80,7 @@ def _elements(system: System, block: Block, values: Mapping[str, Any]) -> Elemen
     every_place = system.mesh.points[block.nodes[:, : len(geometry.nodes)]]
     matrices = mass_matrices(cell, every_place, density, ring=ring, geometry=geometry)
     dofs = np.concatenate([system.numbering.nodal[name][nodes] for name in names], axis=1)
-    kernel = Mass(matrices, len(names))
+    kernel = MassKernel(matrices, len(names))
     return ElementBlock(
         f"mass of {block.name}", kernel, system.mesh.points[nodes].reshape(len(nodes), -1), dofs,
         check_orientation=False,
@@ -125,7 +125,7 @@ def mass_matrix(system: System, problem: Problem, x: Array, given: Masses | None
         names = list(block.kernel.parameters)
         if PARAMETER in names and block.name in system.blocks:
             M = csc_array(M + _of_page(problem, block, x, names.index(PARAMETER)))
-    if not system.share.largest(float(M.nnz)):
+    if not system.comm.max(float(M.nnz)):
         raise StudyError(
             f"there is no mass: give densities, {_EXAMPLE}, or write accelerations into a page"
         )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.contact.search import Sought, TouchingProblem
+from softehl.runtime.contact.search import ContactProblem, StateDependentBlocks
 from softehl.runtime.definition.problem_definition import (
     Block,
     Condition,
@@ -19,7 +19,7 @@ from softehl.runtime.definition.problem_definition import (
     StudyError,
 )
 from softehl.runtime.discretisation.assembly import Assembler
-from softehl.runtime.discretisation.communicator import ALONE, Share
+from softehl.runtime.discretisation.communicator import SERIAL, Communicator
 from softehl.runtime.discretisation.dofmap import Numbering
 from softehl.runtime.discretisation.loads import Tie, amount
 from softehl.runtime.discretisation.problem import Problem
@@ -72,7 +72,7 @@ class System:
         Ties both sides of which are prescribed: checked, not solved.
     start : mapping of str to array (points,)
         Initial values, nan where there are none.
-    share : object
+    comm : object
         Distribution of the unknowns over processes.
     whole : System, optional
         The equations of all processes, of a distributed system.
@@ -91,11 +91,11 @@ class System:
     conditions: tuple[Condition, ...]
     implied: tuple[Force, ...] = ()
     start: Mapping[str, Array] = field(default_factory=dict)
-    share: Share = ALONE
+    comm: Communicator = SERIAL
     whole: System | None = None
     statement: Statement | None = field(default=None, repr=False)
     written: int = 0
-    contacts: tuple[Sought, ...] = ()
+    contacts: tuple[StateDependentBlocks, ...] = ()
 
     def __repr__(self) -> str:
         """Summary in one line."""
@@ -225,7 +225,7 @@ class System:
         StudyError
             Prescribed values contradict each other, or the study has changed since.
         """
-        posed: Problem = self.share.posed(self.part(step))
+        posed: Problem = self.comm.distribute(self.part(step))
         return posed
 
     def part(self, step: Step) -> Problem:
@@ -277,7 +277,7 @@ class System:
         posed_on: dict[str, Any] = {"fixed": fixed, "values": values}
         if self.contacts:
             posed_on |= {"contacts": self.contacts, "old": step.old}
-        kind = TouchingProblem if self.contacts else Problem
+        kind = ContactProblem if self.contacts else Problem
         return kind(assembler, layout, parameters, **posed_on)
 
     def _data(self, page: Block, step: Step) -> Array | None:

@@ -17,7 +17,7 @@ from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.equations.contact_setup import contact_of, with_contacts
 from softehl.runtime.equations.system import System
-from softehl.runtime.mesh.face_matching import matched
+from softehl.runtime.mesh.face_matching import match_faces
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.suggestions import listed, meant
 
@@ -72,7 +72,9 @@ def _warn_of_holes(statement: Statement) -> None:
         if any(part is nodes or np.array_equal(part, nodes) for part in own):
             continue
         known = np.concatenate([nodes[:0], *own])
-        bare[kind] = matched(nodes, known, nodes.shape[1]) < 0 if len(known) else nodes[:, 0] >= 0
+        bare[kind] = (
+            match_faces(nodes, known, nodes.shape[1]) < 0 if len(known) else nodes[:, 0] >= 0
+        )
     count, total = sum(map(np.sum, bare.values())), sum(map(len, mesh.cells.values()))
     if not 0 < count < total:  # pages on sides or nodes alone leave no hole
         return

@@ -1,4 +1,4 @@
-"""One call of a kernel: what its family takes, and the check of what is given.
+"""Call of a kernel: arguments of its family, and their checks.
 
 The shapes, orders and units of every array are those of `codegen/abi.py`.
 """

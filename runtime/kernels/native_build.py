@@ -1,4 +1,4 @@
-"""The library of the kernels that ship, tuned to the processor of this machine.
+"""Native build of the shipped kernels for the processor of this machine.
 
 It is compiled at its first use, where there is a C compiler, into the user's cache:
 `python -m softehl.codegen.tools.build` does so in a process of its own, and knows in every later

@@ -1,4 +1,4 @@
-"""Compiled kernels: finding them and calling them; the only module that knows cffi.
+"""Shared libraries of compiled kernels: finding, loading and calling them by cffi.
 
 A folder holds generated C, its `manifest.json` and the shared library that was built from it.  Of
 the kernels that ship the library is one tuned to the processor (`native_build`), or where there is
@@ -51,7 +51,7 @@ Action = Callable[[tuple[int, int], Array, Array, Any, Array, Array], None]
 
 
 class KernelError(SoftehlError, RuntimeError):
-    """A kernel cannot be used; the message says what to do."""
+    """Error: a kernel cannot be used; the message gives the remedy."""
 
 
 class MissingKernelsError(KernelError):
@@ -86,8 +86,11 @@ class Library:
             values: Array,
             tangent: Array | None,
         ) -> None:
+            elements, points, modes = counts
             function(
-                *counts,
+                elements,
+                points,
+                modes,
                 *map(_pointer, read),
                 _pointer(values),
                 _ffi.NULL if tangent is None else _pointer(tangent),
@@ -102,13 +105,13 @@ class Library:
         a function of these, of the values and of the tangent that it writes.
         """
         function = self._plain(kernel, task)
-        first_pointer, *other_pointers = (_pointer(array) for k, array in enumerate(read) if k != 1)
+        elements, points, modes = counts
+        first, *others = (_pointer(array) for k, array in enumerate(read) if k != 1)
 
         def call(dofs: Array, values: Array, tangent: Array | None) -> None:
             written = _ffi.NULL if tangent is None else _pointer(tangent)
-            function(
-                *counts, first_pointer, _pointer(dofs), *other_pointers, _pointer(values), written
-            )
+            unknowns, result = _pointer(dofs), _pointer(values)
+            function(elements, points, modes, first, unknowns, *others, result, written)
 
         return call
 
@@ -121,8 +124,9 @@ class Library:
         def call(
             span: tuple[int, int], parameters: Array, kept: Array, index: Any, x: Array, y: Array
         ) -> None:
-            pointers = _pointer(parameters), _pointer(kept), _ffi.from_buffer(_INTS, index)
-            function(*span, *pointers, _pointer(x), _pointer(y))
+            begin, end = span
+            numbers, data = _ffi.from_buffer(_INTS, index), (_pointer(parameters), _pointer(kept))
+            function(begin, end, data[0], data[1], numbers, _pointer(x), _pointer(y))
 
         return call
 
@@ -165,7 +169,7 @@ def damaged_manifest(directory: Path) -> StaleKernelsError:
 
 
 def library_of(directory: Path = GENERATED) -> Library:
-    """The library of a folder; for the kernels that ship the best there is.
+    """Library of a folder; for the shipped kernels the best one available.
 
     Raises `KernelError` when it is missing, stale or damaged.
     """
@@ -241,5 +245,5 @@ def _sources_signature(directory: Path) -> str:
 
 @cache
 def _declare(name: str, signature: str = _SIGNATURE) -> None:
-    """Tell cffi of a C function; to tell it of all of them at once takes half a second."""
+    """Declare a C function to cffi; declaring all of them at once takes half a second."""
     _ffi.cdef(f"void {name}{signature}")

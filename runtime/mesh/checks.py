@@ -6,7 +6,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.mesh.cells import CELLS, jacobians
-from softehl.runtime.mesh.face_matching import repeated
+from softehl.runtime.mesh.face_matching import is_repeated
 from softehl.runtime.mesh.mesh import Mesh, MeshError, place_text
 
 
@@ -34,7 +34,7 @@ def check(mesh: Mesh) -> None:
 
 def _require_once(mesh: Mesh, where: str, kind: str, nodes: Integers) -> None:
     """Raise MeshError for the same nodes twice: a stiffness or a load would count twice."""
-    again = repeated(nodes)
+    again = is_repeated(nodes)
     if again.any():
         first = int(again.argmax())
         raise MeshError(

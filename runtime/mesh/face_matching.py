@@ -7,7 +7,7 @@ import numpy as np
 from softehl.runtime.arrays import Flags, Integers
 
 
-def once(faces: Integers, corners: int, origin: Integers | None = None) -> Integers:
+def unrepeated_faces(faces: Integers, corners: int, origin: Integers | None = None) -> Integers:
     """The rows whose corners, the first of their nodes, occur only once.
 
     origin: number of each node, the same for copies of one.
@@ -19,7 +19,7 @@ def once(faces: Integers, corners: int, origin: Integers | None = None) -> Integ
     return np.ascontiguousarray(faces[np.sort(first[count == 1])])
 
 
-def firsts(rows: Integers) -> tuple[Integers, Integers]:
+def first_occurrences(rows: Integers) -> tuple[Integers, Integers]:
     """Of rows (n, k) with the same nodes in any order the first, in the order of the rows; and for
     each row (n,) which of these it is.
     """
@@ -31,23 +31,23 @@ def firsts(rows: Integers) -> tuple[Integers, Integers]:
     return first[order], rank[inverse.ravel()]
 
 
-def matched(faces: Integers, known: Integers, corners: int) -> Integers:
+def match_faces(faces: Integers, reference: Integers, corners: int) -> Integers:
     """For each face (n,) the row of the known ones with the same corners, else -1."""
-    both = np.sort(np.concatenate([known, faces])[:, :corners], axis=1)
+    both = np.sort(np.concatenate([reference, faces])[:, :corners], axis=1)
     _, inverse = np.unique(both, axis=0, return_inverse=True)
     inverse = inverse.ravel()
     row = np.full(int(inverse.max(initial=-1)) + 1, -1)
-    row[inverse[: len(known)]] = np.arange(len(known))
-    return np.asarray(row[inverse[len(known) :]])
+    row[inverse[: len(reference)]] = np.arange(len(reference))
+    return np.asarray(row[inverse[len(reference) :]])
 
 
-def as_known(faces: Integers, known: Integers, corners: int) -> Integers:
+def orient_as(faces: Integers, reference: Integers, corners: int) -> Integers:
     """Faces with the nodes in the order of the known ones, where they are among them."""
-    row = matched(faces, known, corners)
-    return np.where((row >= 0)[:, None], known[row], faces) if len(known) else faces
+    row = match_faces(faces, reference, corners)
+    return np.where((row >= 0)[:, None], reference[row], faces) if len(reference) else faces
 
 
-def repeated(rows: Integers) -> Flags:
+def is_repeated(rows: Integers) -> Flags:
     """Which rows (n, k) have the nodes of a row before them."""
-    first, rank = firsts(rows)
+    first, rank = first_occurrences(rows)
     return np.asarray(first[rank] != np.arange(len(rows)))

@@ -13,7 +13,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.face_matching import matched
+from softehl.runtime.mesh.face_matching import match_faces
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 
 SHAPES = ("tri", "quad", "tet", "hex")
@@ -64,13 +64,13 @@ def interior(mesh: Mesh, kind: str) -> Integers:
     return np.ascontiguousarray(np.hstack([every[one], second]))
 
 
-def beside(mesh: Mesh, where: str | Predicate, kind: str) -> Integers:
+def cells_at_side(mesh: Mesh, where: str | Predicate, kind: str) -> Integers:
     """Nodes (n, k) of the cells of a kind at the faces of a side, turned."""
     turned, cells = turns(kind), mesh.cells[kind]
     every = cells[:, turned[:, 0]].reshape(-1, cells.shape[1])
     face, at = CELLS[kind].side_nodes[0]
     faces = mesh.outer_faces(where).get(face.name, np.empty((0, len(at)), dtype=np.int64))
-    rows = matched(faces, every[:, list(at)], face.corners)
+    rows = match_faces(faces, every[:, list(at)], face.corners)
     return np.ascontiguousarray(every[rows[rows >= 0]])
 
 
@@ -99,7 +99,7 @@ def split(mesh: Mesh) -> Mesh:
             if not cell_faces:
                 sides[name][face] = _copies(mesh, cells, side_faces)
                 continue
-            rows = matched(side_faces, np.concatenate(cell_faces), CELLS[face].corners)
+            rows = match_faces(side_faces, np.concatenate(cell_faces), CELLS[face].corners)
             sides[name][face] = np.concatenate(new_faces)[rows]
     return Mesh(mesh.points[old], cells, mesh.groups, sides, mesh.origin[old])
 

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Flags, Integers, frozen
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.face_matching import as_known, matched, once
-from softehl.runtime.mesh.partitioning import Piece
+from softehl.runtime.mesh.face_matching import match_faces, orient_as, unrepeated_faces
+from softehl.runtime.mesh.partitioning import MeshPartition
 from softehl.runtime.suggestions import few, listed, meant, misfit
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class Mesh:
     groups: Mapping[str, Mapping[str, Integers]] = field(default_factory=dict)
     sides: Mapping[str, Faces] = field(default_factory=dict)
     numbers: Integers | None = None
-    piece: Piece | None = None
+    piece: MeshPartition | None = None
 
     def __post_init__(self) -> None:
         """Raises MeshError for an unknown kind of cell or a wrong number of nodes."""
@@ -496,12 +496,12 @@ class Mesh:
             for face, local in CELLS[kind].side_nodes:
                 by_kind.setdefault(face.name, []).append(nodes[:, list(local)])
         faces = {
-            k: once(np.concatenate(parts), CELLS[k].corners, self.numbers)
+            k: unrepeated_faces(np.concatenate(parts), CELLS[k].corners, self.numbers)
             for k, parts in by_kind.items()
         }
         if self.piece is not None:
             cuts = self.piece.cuts
-            faces = {k: f[matched(f, cuts[k], CELLS[k].corners) < 0] for k, f in faces.items()}
+            faces = {k: f[match_faces(f, cuts[k], CELLS[k].corners) < 0] for k, f in faces.items()}
         return _owned(faces, "")
 
     def faces(self, where: str | Predicate) -> Faces:
@@ -532,7 +532,7 @@ class Mesh:
             allowed = ", ".join([*self.sides, "boundary"])
             raise MeshError(f"no side {where!r}{meant(where, self.sides)}; there are {allowed}")
         return {
-            kind: as_known(faces, self.boundary[kind], CELLS[kind].corners)
+            kind: orient_as(faces, self.boundary[kind], CELLS[kind].corners)
             if kind in self.boundary
             else faces
             for kind, faces in self.sides[where].items()
@@ -568,7 +568,7 @@ class Mesh:
                     f"{name} is of {what} ({kind}); in {self.dimension}-D a side of {face_word} of "
                     f"the boundary is needed, such as {few(self._outer_sides())}"
                 )
-            lost = faces[matched(faces, outer, cell.corners) < 0] if solid else faces[:0]
+            lost = faces[match_faces(faces, outer, cell.corners) < 0] if solid else faces[:0]
             if len(lost):
                 point_text = place_text(self.points[lost[0]].mean(axis=0))
                 raise MeshError(

@@ -13,7 +13,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.face_matching import matched
+from softehl.runtime.mesh.face_matching import match_faces
 from softehl.runtime.mpi import world
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class MeshPartition:
     """Connection of the part of a mesh that this process has with those of the others.
 
     numbers: (n,) number of each node in the whole mesh. shared: process -> nodes that it has too,
@@ -41,7 +41,7 @@ class Piece:
                 is_owned[nodes] = False
         return is_owned
 
-    def told(self, values: Array | Flags | Integers) -> dict[int, Any]:
+    def exchange(self, values: Array | Flags | Integers) -> dict[int, Any]:
         """Of values (..., n) at nodes what the others have at shared ones: process -> (..., k)."""
         comm = world()
         sent = [values[..., self.shared[p]] if p in self.shared else None for p in range(comm.size)]
@@ -51,7 +51,7 @@ class Piece:
 
     def added(self, values: Array) -> Array:
         """Sums (n,) of values at nodes over all processes, in the order of the processes."""
-        rank, received, sums = world().rank, self.told(values), np.zeros(len(values))
+        rank, received, sums = world().rank, self.exchange(values), np.zeros(len(values))
         for process in sorted([rank, *received]):
             if process == rank:
                 sums += values
@@ -63,7 +63,7 @@ class Piece:
         """Nodes that this process or another one means, sorted."""
         mask: Flags = np.zeros(len(self.numbers), dtype=bool)
         mask[nodes] = True
-        for process, flags in self.told(mask).items():
+        for process, flags in self.exchange(mask).items():
             mask[self.shared[process][flags]] = True
         return np.flatnonzero(mask)
 
@@ -72,7 +72,7 @@ class Piece:
         return bool(world().allreduce(int(bool(something))))
 
 
-def joined(mesh: Mesh, numbers: Integers) -> Mesh:
+def join_partitions(mesh: Mesh, numbers: Integers) -> Mesh:
     """The part `mesh` of this process as one of the whole, in which its nodes have `numbers`.
 
     All processes then know the same kinds of cells and the same names, of which they may have none.
@@ -93,7 +93,7 @@ def joined(mesh: Mesh, numbers: Integers) -> Mesh:
         }
         for name, side in mesh.sides.items()
     }
-    return replace(mesh, sides=sides, piece=Piece(numbers, shared, cuts))
+    return replace(mesh, sides=sides, piece=MeshPartition(numbers, shared, cuts))
 
 
 def _with_names_of_all(mesh: Mesh) -> Mesh:
@@ -168,5 +168,5 @@ def _common(
     is_common: Flags = np.zeros(len(faces), dtype=bool)
     for process, other_faces in enumerate(comm.alltoall(sent)):
         if other_faces is not None and len(other_faces) and (process < comm.rank or not before):
-            is_common |= matched(corners_here, other_faces, corners) >= 0
+            is_common |= match_faces(corners_here, other_faces, corners) >= 0
     return is_common

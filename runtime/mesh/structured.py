@@ -12,7 +12,7 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers, count_of
 from softehl.runtime.mesh.cells import CELLS, lobatto
 from softehl.runtime.mesh.mesh import Mesh, MeshError
-from softehl.runtime.mesh.partitioning import joined
+from softehl.runtime.mesh.partitioning import join_partitions
 from softehl.runtime.mpi import world
 
 KINDS = {
@@ -66,7 +66,7 @@ def grid(
     index = np.unravel_index(used, [len(axis) for axis in axes], order="F")
     strides = np.cumprod([1, *(order * n + 1 for n in counts[:-1])])
     moved = [at + order * first for at, (first, _) in zip(index, spans, strict=True)]
-    return joined(mesh, np.stack(moved, axis=1) @ strides)
+    return join_partitions(mesh, np.stack(moved, axis=1) @ strides)
 
 
 def _span(counts: Sequence[int], rank: int, processes: int) -> list[tuple[int, int]]:
@@ -74,10 +74,9 @@ def _span(counts: Sequence[int], rank: int, processes: int) -> list[tuple[int, i
 
     The box is cut into equal boxes with the least area between them.
     """
-    divisors = [range(1, processes + 1)] * len(counts)
     fit = [
         cuts
-        for cuts in product(*divisors)
+        for cuts in product(range(1, processes + 1), repeat=len(counts))
         if prod(cuts) == processes and all(c <= n for c, n in zip(cuts, counts, strict=True))
     ]
     if not fit:

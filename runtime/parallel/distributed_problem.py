@@ -1,4 +1,4 @@
-"""A problem that is spread over processes, as Newton's method sees it: all decide alike."""
+"""A problem distributed over processes; all processes decide alike."""
 
 from __future__ import annotations
 
@@ -9,52 +9,63 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.discretisation.p_multigrid import Levels
+from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.discretisation.problem_checks import (
     element_name,
     rows_not_finite,
     unknown_name,
 )
-from softehl.runtime.discretisation.residual_norm import ROUNDING, Balance, hides, is_far, size
+from softehl.runtime.discretisation.residual_norm import (
+    ROUNDING,
+    ResidualBalance,
+    hides,
+    is_far,
+    residual_norm,
+)
 from softehl.runtime.mpi import world
-from softehl.runtime.parallel.halo_exchange import Exchange, largest, total
-from softehl.runtime.parallel.matshell import Shell
-from softehl.runtime.parallel.partitioning import Part
-from softehl.runtime.parallel.petsc_matrix import Operator, Solver, Tangent
-from softehl.runtime.parallel.static_condensation import Outer
+from softehl.runtime.parallel.halo_exchange import HaloExchange, global_max, global_sum
+from softehl.runtime.parallel.matshell import MatrixFreeShell
+from softehl.runtime.parallel.partitioning import LocalSystem
+from softehl.runtime.parallel.petsc_matrix import DistributedOperator, PetscMatrix, PetscSolver
+from softehl.runtime.parallel.static_condensation import ExternalUnknowns
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 from softehl.runtime.solve.singularity_check import SINGULAR, random_signs, without_small_entries
 
 
 @dataclass(eq=False)
-class Team:
-    """Objects that the processes share through a whole path: exchange of vectors, and the matrix.
+class ParallelContext:
+    """State of a process along a path: halo exchange, matrix, linear solver.
 
     tangent: of the latest set of prescribed unknowns. levels: of multigrid in the order, where the
     tangent is to be no matrix. outer: what PETSc has. reach, counts: see `Assembler`, of own
     unknowns.
     """
 
-    part: Part
-    exchange: Exchange
-    outer: Outer
+    part: LocalSystem
+    exchange: HaloExchange
+    outer: ExternalUnknowns
     interleaved: int
-    solver: Solver
-    levels: Levels | None = None
-    tangent: Operator | None = None
+    solver: PetscSolver
+    levels: MultigridLevels | None = None
+    tangent: DistributedOperator | None = None
     reach: Array = field(default_factory=lambda: np.empty(0))
     counts: Array = field(default_factory=lambda: np.empty(0))
 
-    def renewed(self) -> Team:
+    def with_other_elements(self) -> ParallelContext:
         """For other elements on the same unknowns."""
-        given = self.part, self.exchange, self.outer, self.interleaved
-        return Team(*given, replace(self.solver))
+        return ParallelContext(
+            part=self.part,
+            exchange=self.exchange,
+            outer=self.outer,
+            interleaved=self.interleaved,
+            solver=replace(self.solver),
+        )
 
-    def tangent_of(self, problem: Problem) -> Operator:
+    def tangent_of(self, problem: Problem) -> DistributedOperator:
         """The matrix for the prescribed unknowns of a problem, or a new shell."""
         tangent = self.tangent
-        same = isinstance(tangent, Tangent) and tangent.serves(problem.assembler, problem.fixed)
+        same = isinstance(tangent, PetscMatrix) and tangent.serves(problem.assembler, problem.fixed)
         if world().allreduce(int(not same)) or tangent is None:
             if tangent is not None:
                 tangent.matrix.destroy()  # a shell and PETSc's matrix hold each other
@@ -62,19 +73,24 @@ class Team:
             self.tangent = tangent = self._new(problem)
         return tangent
 
-    def _new(self, problem: Problem) -> Operator:
+    def _new(self, problem: Problem) -> DistributedOperator:
         if self.levels is not None:
-            return Shell(problem, self.levels, self.exchange)
-        given = problem.assembler, problem.fixed, self.exchange, self.outer
-        return Tangent.of(*given, self.interleaved)
+            return MatrixFreeShell(problem, self.levels, self.exchange)
+        return PetscMatrix.of(
+            problem.assembler,
+            problem.fixed,
+            exchange=self.exchange,
+            outer=self.outer,
+            block=self.interleaved,
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class Factors:
+class DistributedFactors:
     """Matrix and solver of Newton's method on all processes."""
 
-    tangent: Operator
-    solver: Solver
+    tangent: DistributedOperator
+    solver: PetscSolver
 
     def solve(self, r: Array) -> Array:
         """Local x, (m,), of own r, (k,)."""
@@ -89,7 +105,7 @@ class Factors:
             y = self.solve(random_signs(len(exchange.owned), world().rank))[exchange.owned]
         except SingularMatrix:
             return None
-        largest_entry = float(largest(np.abs(y).max(initial=0.0)))
+        largest_entry = float(global_max(np.abs(y).max(initial=0.0)))
         y = without_small_entries(y, largest_entry)
         resisted = np.abs(self.tangent.times(y)) > SINGULAR * self.tangent.times_magnitudes(
             np.abs(y)
@@ -102,25 +118,25 @@ class Factors:
 
 
 @dataclass(frozen=True)
-class Distributed:
-    """The linear solver of spread problems: PETSc's."""
+class DistributedSolver:
+    """Linear solver of distributed problems: that of PETSc."""
 
     name: str = "petsc"
 
-    def factorise(self, K: Any) -> Factors:
+    def factorise(self, K: Any) -> DistributedFactors:
         """The matrix itself, which can solve."""
-        assert isinstance(K, Factors)
+        assert isinstance(K, DistributedFactors)
         return K
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
-    """The local part of a problem with what the processes share.  Vectors x are local, (m,); r is
+class DistributedProblem:
+    """Local part of a distributed problem.  Vectors x are local, (m,); r is
     that of own unknowns, (k,).  Every method is called by all processes alike.
     """
 
     problem: Problem
-    team: Team
+    team: ParallelContext
 
     @property
     def assembler(self) -> Any:
@@ -145,14 +161,19 @@ class Spread:
         r = self.team.exchange.added(self.problem.assembler.residual(x, self.parameters))
         return self._prescribed(r, x - self._wanted(x))
 
-    def linearise(self, x: Array) -> tuple[Array, Factors]:
+    def linearise(self, x: Array) -> tuple[Array, DistributedFactors]:
         """Residual with the influence of prescribed unknowns moved into it, and the tangent."""
         tangent = self.team.tangent_of(self.problem)
         defect = x - self._wanted(x)
-        given = self.problem.assembler, x, self.parameters
-        r = tangent.fill(*given, defect, self.team.solver.times)
+        r = tangent.fill(
+            self.problem.assembler,
+            x,
+            self.parameters,
+            defect=defect,
+            times=self.team.solver.times,
+        )
         r = self._prescribed(self.team.exchange.added(r), defect)
-        return r, Factors(tangent, self.team.solver)
+        return r, DistributedFactors(tangent, self.team.solver)
 
     def norm(self, r: Array) -> float:
         """Never asked: the problem measures its residuals itself."""
@@ -162,12 +183,12 @@ class Spread:
         """Problems of studies have no guards."""
         return 1.0
 
-    def measure(self, x: Array, K: Factors | None, *, rounded: bool = False) -> float:
+    def measure(self, x: Array, K: DistributedFactors | None, *, rounded: bool = False) -> float:
         """See `Problem.measure`: the same sums, over all processes."""
         owned, exchange, problem = self.team.part.owned, self.team.exchange, self.problem
         sums = problem.assembler.residual_and_size(x, self.parameters)
         r, forces = exchange.added(sums[0]), exchange.added(sums[1])
-        if total(np.array([float(not np.isfinite(r).all())]))[0]:
+        if global_sum(np.array([float(not np.isfinite(r).all())]))[0]:
             return float("inf")
         noise, terms = np.zeros(len(owned)), np.zeros(len(owned))
         if K is not None:
@@ -182,8 +203,10 @@ class Spread:
         defect = np.maximum(np.abs(r) - noise, 0.0) * free[owned]
         deviation, extent = (x - target)[owned], np.maximum(np.abs(x), np.abs(target))[owned]
         met = ~free[owned] | (self._counts() > 1)
-        balance = Balance(defect, forces, terms, met, deviation, extent)
-        return size(total(balance.squares(self._fields())), largest(balance.worst()))
+        balance = ResidualBalance(defect, forces, terms, met, deviation, extent)
+        return residual_norm(
+            global_sum(balance.squares(self._fields())), global_max(balance.worst())
+        )
 
     def name_of(self, number: int) -> str:
         """An unknown for messages, by PETSc's number."""
@@ -203,7 +226,7 @@ class Spread:
         part, message = self.team.part, ""
         for block in self.problem.assembler.blocks:
             results = block.tangent(x, self.parameters[block.name])
-            rows = rows_not_finite(*results)
+            rows = rows_not_finite(results)
             if len(rows) and not message and block.name in part.elements:
                 global_block = part.system.everywhere.assembler.block(block.name)
                 message = element_name(global_block, int(part.elements[block.name][rows[0]]))
@@ -234,7 +257,7 @@ class Spread:
             team.counts = team.exchange.added(counts.astype(np.float64))
         return team.counts
 
-    def _terms(self, magnitudes: Array, K: Factors) -> Array:
+    def _terms(self, magnitudes: Array, K: DistributedFactors) -> Array:
         """See `Problem`; magnitudes and sums of own unknowns, (k,)."""
         exchange, problem = self.team.exchange, self.problem
         root = np.sqrt(K.tangent.diagonal())
@@ -243,15 +266,15 @@ class Spread:
         around = exchange.added(problem.assembler.around(local, self.parameters))
         return K.tangent.times_magnitudes(magnitudes) + root * around
 
-    def _is_lost(self, x: Array, forces: Array, K: Factors) -> bool:
+    def _is_lost(self, x: Array, forces: Array, K: DistributedFactors) -> bool:
         """See `Problem`."""
         reach = self._reach()
         values = np.abs(self.problem.values).max(initial=0.0)
-        reference = largest(max(float(reach.max(initial=0.0)), float(values)))
-        if not is_far(largest(float(np.abs(x).max(initial=0.0))), reference):
+        reference = global_max(max(float(reach.max(initial=0.0)), float(values)))
+        if not is_far(global_max(float(np.abs(x).max(initial=0.0))), reference):
             return False
         noise = ROUNDING * K.tangent.times_magnitudes(np.abs(x)[self.team.part.owned] + reach)
-        norms = np.sqrt(total(np.array([noise @ noise, forces @ forces])))
+        norms = np.sqrt(global_sum(np.array([noise @ noise, forces @ forces])))
         return hides(*norms.tolist())
 
     def _fields(self) -> list[Integers]:
@@ -261,5 +284,5 @@ class Spread:
 
 
 def _first(words: str) -> str:
-    """Words of the first process that has any."""
+    """Message of the first process that has one."""
     return next((w for w in world().allgather(words) if w), "")

@@ -10,39 +10,39 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.discretisation.communicator import Share
+from softehl.runtime.discretisation.communicator import Communicator
 from softehl.runtime.discretisation.constraints import symmetric
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
 from softehl.runtime.parallel.linear_solver_choice import Linear, linear_solver, modes_by_multigrid
-from softehl.runtime.solve.linear.amg import Modes
-from softehl.runtime.solve.linear.factorisation_cache import Kept
-from softehl.runtime.solve.linear.lobpcg import lowest
+from softehl.runtime.solve.linear.amg import NearNullspace
+from softehl.runtime.solve.linear.factorisation_cache import FactorisationCache
+from softehl.runtime.solve.linear.lobpcg import lowest_modes
 from softehl.runtime.solve.newton import Newton
 
 
 @dataclass(eq=False)
-class Large(Share):
-    """All on one process, modes by multigrid. near: what it should know of."""
+class MultigridModesCommunicator(Communicator):
+    """Communicator of one process, with modes by multigrid. near: near null space."""
 
-    near: Modes
+    near: NearNullspace
 
-    def lowest(
+    def lowest_modes(
         self, problem: Problem, K: csc_array, M: csc_array, count: int
     ) -> tuple[Array, Array]:
-        """See `Share`."""
-        return lowest(symmetric(problem.eliminated(K)), symmetric(M), self.near, count)
+        """See `Communicator`."""
+        return lowest_modes(symmetric(problem.eliminated(K)), symmetric(M), self.near, count)
 
 
 class Engine(Protocol):
-    """Spreads the equations of a study, and knows the linear solver that goes with that."""
+    """Distributes the equations of a study, and provides their linear solver."""
 
     def spread(self, system: System) -> System:
-        """The part of the equations that this process has; see `Share`."""
+        """The part of the equations that this process has; see `Communicator`."""
         ...
 
     def newton(self, system: System, given: Newton | None) -> Newton:
-        """Newton's method as it was asked for, on the linear solver for what `spread` gave."""
+        """Newton's method with the linear solver of the distributed equations."""
         ...
 
 
@@ -52,7 +52,7 @@ AnyEngine: TypeAlias = "str | Engine | None"
 
 @dataclass(eq=False)
 class Serial:
-    """Everything in this process, with the linear solver that is asked for.
+    """Engine of one process, with the requested linear solver.
 
     note: says which one, where the size of the problem decides.
     """
@@ -64,7 +64,11 @@ class Serial:
         """See `Engine`."""
         system.mesh.require_whole('engine = "serial"')
         nullspace = modes_by_multigrid(system, self.linear)
-        return system if nullspace is None else replace(system, share=Large(nullspace))
+        return (
+            system
+            if nullspace is None
+            else replace(system, comm=MultigridModesCommunicator(nullspace))
+        )
 
     def newton(self, system: System, given: Newton | None) -> Newton:
         """See `Engine`."""
@@ -73,7 +77,7 @@ class Serial:
         if given is not None:
             return given
         solver, self.note = linear_solver(system, self.linear)
-        return Newton(linear=Kept(solver))
+        return Newton(linear=FactorisationCache(solver))
 
 
 def engine_of(engine: AnyEngine, linear: Linear = "auto") -> Engine:
@@ -110,5 +114,5 @@ def _matrix_free(engine: AnyEngine) -> Engine:
 
 
 def note_of(engine: Engine) -> Callable[[], str]:
-    """The words on the linear solver that an engine chose; none of others than `Serial`."""
+    """Message on the linear solver that `Serial` chose; empty for other engines."""
     return engine.note if isinstance(engine, Serial) else str

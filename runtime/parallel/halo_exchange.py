@@ -1,4 +1,4 @@
-"""Vectors that are spread over processes: own unknowns, copies of the neighbours', sums, norms."""
+"""Halo exchange of distributed vectors: owned unknowns, copies of the neighbours', reductions."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from softehl.runtime.mpi import petsc, world
 
 
 @dataclass(eq=False)
-class Exchange:
-    """Between local vectors (m,), in the order of `Part.unknowns`, and PETSc's.
+class HaloExchange:
+    """Exchange between local vectors (m,), in the order of `LocalSystem.unknowns`, and PETSc's.
 
     numbers: (m,) PETSc's number of each local unknown. owned: (k,) local numbers of own unknowns,
-    and places: (k,) where they stand in this process's piece of PETSc's vectors.
+    and positions: (k,) where they stand in this process's piece of PETSc's vectors.
     vector, copies: work space. sent: bytes that went to other processes, counted.
     """
 
     numbers: Integers
     owned: Integers
-    places: Integers
+    positions: Integers
     vector: Any
     copies: Any
     scatter: Any
@@ -30,7 +30,7 @@ class Exchange:
     sent: int = field(default=0)
 
     @classmethod
-    def of(cls, numbers: Integers, owned: Integers, starts: Integers) -> Exchange:
+    def of(cls, numbers: Integers, owned: Integers, starts: Integers) -> HaloExchange:
         """Of unknowns with these numbers (m,); starts: where those of each process begin."""
         PETSc, comm = petsc(), world()
         first, last = starts[comm.rank : comm.rank + 2]
@@ -49,9 +49,9 @@ class Exchange:
         self.sent += 8 * self.ghosts
         return np.array(self.copies.array_r)
 
-    def copied(self, own: Array) -> Array:
+    def copied(self, owned_values: Array) -> Array:
         """The local vector (m,) of own values (k,)."""
-        vector = self.to_petsc(own)
+        vector = self.to_petsc(owned_values)
         local = self.local(vector)
         vector.destroy()
         return local
@@ -64,12 +64,12 @@ class Exchange:
         """Of numbers (m,), at least 0, the largest of any process: of own unknowns, (k,)."""
         return self._back(x, petsc().InsertMode.MAX_VALUES)
 
-    def renumbered(self, kept: Flags) -> tuple[Integers, Integers]:
+    def renumbered(self, mask: Flags) -> tuple[Integers, Integers]:
         """PETSc's numbers (m,) if it had only those own unknowns (k,) that are kept, -1 for others;
         and where those of each process begin.
         """
-        indices = np.flatnonzero(kept)
-        indices = indices[np.argsort(self.places[indices])]
+        indices = np.flatnonzero(mask)
+        indices = indices[np.argsort(self.positions[indices])]
         starts = np.concatenate([[0], np.cumsum(world().allgather(len(indices)))])
         new_numbers = np.full(len(self.owned), -1.0)
         new_numbers[indices] = starts[world().rank] + np.arange(len(indices))
@@ -80,25 +80,25 @@ class Exchange:
         self.vector.set(0.0)
         self.scatter.scatter(self.copies, self.vector, mode, petsc().ScatterMode.REVERSE)
         self.sent += 8 * self.ghosts
-        return np.array(self.vector.array_r[self.places])
+        return np.array(self.vector.array_r[self.positions])
 
-    def to_petsc(self, own: Array) -> Any:
+    def to_petsc(self, owned_values: Array) -> Any:
         """A new vector of PETSc's with these own values (k,): whoever asks destroys it, for Python
         cannot tell when the other processes are done with it.
         """
         vector = self.vector.duplicate()
-        vector.array[self.places] = own
+        vector.array[self.positions] = owned_values
         return vector
 
 
-def total(values: Array) -> Array:
+def global_sum(values: Array) -> Array:
     """Sums over processes."""
     sums = np.empty_like(values)
     world().Allreduce(np.ascontiguousarray(values), sums)
     return sums
 
 
-def largest(value: float) -> float:
+def global_max(value: float) -> float:
     """The largest number of any process; nan where one is."""
     result = np.empty(2)
     world().Allreduce(np.array([value, float(np.isnan(value))]), result, _maximum())

@@ -1,4 +1,4 @@
-"""The linear solver of one process by the size of the problem."""
+"""Choice of the linear solver of one process by the size of the problem."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from softehl.runtime.arrays import Flags, Integers
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.assembly import Assembler
-from softehl.runtime.discretisation.near_nullspace import is_vector, motions
+from softehl.runtime.discretisation.near_nullspace import is_vector, rigid_body_modes
 from softehl.runtime.equations.system import System
 from softehl.runtime.solve.linear import amg, pardiso
-from softehl.runtime.solve.linear.amg import Modes, Multigrid, OrFactors
-from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.amg import AlgebraicMultigrid, AmgOrDirect, NearNullspace
+from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.linear.linear_solver import LinearSolver
-from softehl.runtime.solve.linear.static_condensation import Condensing
+from softehl.runtime.solve.linear.static_condensation import CondensingSolver
 from softehl.runtime.suggestions import listed
 
 Linear: TypeAlias = Literal["auto", "direct", "superlu", "pardiso", "amg", "matrix-free"]
@@ -39,12 +39,12 @@ def linear_solver(system: System, linear: Linear) -> tuple[LinearSolver, Callabl
     It condenses internal unknowns of elements. Raises StudyError for an unknown name or where
     multigrid cannot be used.
     """
-    groups = internal(system.assembler)
+    groups = internal_unknowns(system.assembler)
     solver, note = _of_rest(system, linear, system.size - sum(g.size for g in groups))
-    return (Condensing(solver, groups) if groups else solver), note
+    return (CondensingSolver(solver, groups) if groups else solver), note
 
 
-def internal(assembler: Assembler) -> tuple[Integers, ...]:
+def internal_unknowns(assembler: Assembler) -> tuple[Integers, ...]:
     """Numbers (n, k) of the internal unknowns of each block that has some."""
     groups = [b.internal.values() for b in assembler.blocks if b.internal]
     return tuple(np.stack(list(numbers), axis=1) for numbers in groups)
@@ -55,39 +55,39 @@ def _of_rest(system: System, linear: Linear, count: int) -> tuple[LinearSolver, 
     if linear not in get_args(Linear):
         raise StudyError(f"linear = {linear!r}: allowed are {listed(get_args(Linear))}")
     if linear in ("superlu", "pardiso"):
-        return choose(linear), str
-    direct = choose("auto")
+        return direct_solver(linear), str
+    direct = direct_solver("auto")
     dimension, faster = system.mesh.dimension, _PARDISO if pardiso.available() else 1.0
     size = f"{count} unknowns in {dimension}-D"
     large = linear == "auto" and count > FACTORS_UP_TO[dimension] * faster
     if linear == "direct" or not (large or linear == "amg"):
         return direct, str
-    modes = nodal_modes(system)
+    modes = near_nullspace(system)
     if modes is None:
         why = "multigrid needs the components of one vector, or one scalar, as the only unknowns"
     elif not amg.available():
         why = "pyamg is not installed: pip install 'softehl[fast]'"
     elif linear == "amg":
-        return Multigrid(modes), lambda: f"multigrid, {size}"
+        return AlgebraicMultigrid(modes), lambda: f"multigrid, {size}"
     else:
         borne = count <= FALL_BACK_UP_TO[dimension] * faster
-        both = OrFactors(Multigrid(modes), direct if borne else None)
+        both = AmgOrDirect(AlgebraicMultigrid(modes), direct if borne else None)
         return both, lambda: f"{both.name}, because of {size}"
     if linear == "amg":
         raise StudyError(f'linear = "amg": {why}')
     return direct, lambda: f"factors by {direct.name} in spite of {size}: {why}"
 
 
-def modes_by_multigrid(system: System, linear: Linear) -> Modes | None:
-    """Motions that multigrid keeps where it finds natural modes; None where factors do."""
+def modes_by_multigrid(system: System, linear: Linear) -> NearNullspace | None:
+    """Near null space if multigrid computes the natural modes; None if direct factors do."""
     large = linear == "auto" and system.size > FACTORS_UP_TO[system.mesh.dimension]
-    if not (large or linear == "amg") or internal(system.assembler) or not amg.available():
+    if not (large or linear == "amg") or internal_unknowns(system.assembler) or not amg.available():
         return None
-    return nodal_modes(system)
+    return near_nullspace(system)
 
 
-def nodal_modes(system: System) -> Modes | None:
-    """Rigid-body motions of displacements, or a constant; None where there is more at the nodes.
+def near_nullspace(system: System) -> NearNullspace | None:
+    """Rigid-body modes of displacements, or a constant; None for other unknowns at nodes.
 
     Internal unknowns of elements do not count.
     """
@@ -106,5 +106,5 @@ def nodal_modes(system: System) -> Modes | None:
     complete = (numbers >= 0).all(axis=1)
     if numbers[complete].size != external.sum():
         return None
-    nullspace = motions(system.mesh.points[complete], names)
-    return Modes(rank[numbers[complete]].ravel(), len(names), nullspace)
+    nullspace = rigid_body_modes(system.mesh.points[complete], names)
+    return NearNullspace(rank[numbers[complete]].ravel(), len(names), nullspace)

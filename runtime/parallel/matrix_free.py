@@ -16,16 +16,16 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.assembly import Assembler
-from softehl.runtime.discretisation.communicator import Share
+from softehl.runtime.discretisation.communicator import Communicator
 from softehl.runtime.discretisation.constraints import Ties
 from softehl.runtime.discretisation.element_blocks import ElementBlock
-from softehl.runtime.discretisation.matrix_free_operator import Iteration, Tangent
+from softehl.runtime.discretisation.matrix_free_operator import KrylovSettings, MatrixFreeOperator
 from softehl.runtime.discretisation.matrix_free_products import (
     NoProductError,
     require_product,
     threads,
 )
-from softehl.runtime.discretisation.p_multigrid import Levels
+from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.equations.system import System
@@ -78,30 +78,30 @@ class MatrixFree:
     def spread(self, system: System) -> System:
         """See `Engine`.  Raises StudyError for what it cannot solve."""
         system.mesh.require_whole(_WHO)
-        pages, order = suitable(system)
+        pages, order = require_products(system)
         levels = levels_of(system, pages, order, self.threads or threads())
-        iteration = Iteration(self.tolerance, self.most, self.iterations)
-        return replace(system, share=_Alone(levels, iteration))
+        iteration = KrylovSettings(self.tolerance, self.most, self.iterations)
+        return replace(system, comm=_MatrixFreeCommunicator(levels, iteration))
 
     def newton(self, system: System, given: Newton | None) -> Newton:
         """See `Engine`."""
-        return replace(given or Newton(), linear=Iterative())
+        return replace(given or Newton(), linear=MatrixFreeSolver())
 
 
 @dataclass(frozen=True)
-class Iterative:
+class MatrixFreeSolver:
     """The linear solver of such problems."""
 
     name: str = "matrix-free"
 
-    def factorise(self, K: Any) -> Tangent:
+    def factorise(self, K: Any) -> MatrixFreeOperator:
         """The tangent itself, which can solve."""
-        assert isinstance(K, Tangent)
+        assert isinstance(K, MatrixFreeOperator)
         return K
 
 
-def suitable(system: System) -> tuple[list[ElementBlock], int]:
-    """Blocks of pages, and their order.  Raises StudyError for what has no such products."""
+def require_products(system: System) -> tuple[list[ElementBlock], int]:
+    """Blocks of pages with matrix-free products, and their order.  Raises StudyError for others."""
     try:
         pages = [system.assembler.block(name) for name in system.blocks]
         kernels = [require_product(block) for block in pages]
@@ -116,13 +116,15 @@ def suitable(system: System) -> tuple[list[ElementBlock], int]:
     return pages, next(iter(cells.values()))
 
 
-def levels_of(system: System, pages: list[ElementBlock], order: int, threads: int) -> Levels:
+def levels_of(
+    system: System, pages: list[ElementBlock], order: int, threads: int
+) -> MultigridLevels:
     """Levels of multigrid for blocks of cells of an order."""
     points, dofmap = system.mesh.points, system.numbering.nodal
-    return Levels.of(points, dofmap, pages, order=order, size=system.size, threads=threads)
+    return MultigridLevels.of(points, dofmap, pages, order=order, size=system.size, threads=threads)
 
 
-def ties_of(problem: Problem, levels: Levels) -> Ties:
+def ties_of(problem: Problem, levels: MultigridLevels) -> Ties:
     """Ties of a problem on all levels.  Raises StudyError where one follows from others."""
     try:
         return Ties.of(problem, levels.unknowns)
@@ -130,32 +132,32 @@ def ties_of(problem: Problem, levels: Levels) -> Ties:
         raise StudyError(str(error)) from None
 
 
-class _Alone(Share):
-    """One process, without matrices."""
+class _MatrixFreeCommunicator(Communicator):
+    """Communicator of one process, without matrices."""
 
-    def __init__(self, levels: Levels, iteration: Iteration) -> None:
+    def __init__(self, levels: MultigridLevels, iteration: KrylovSettings) -> None:
         self.levels, self.iteration = levels, iteration
 
-    def part(self, posed: Matrixless) -> Problem:
-        """See `Share`."""
+    def local_problem(self, posed: MatrixFreeProblem) -> Problem:
+        """See `Communicator`."""
         return posed.problem
 
-    def renewed(self) -> Share:
-        """See `Share`.  Raises StudyError."""
+    def with_other_elements(self) -> Communicator:
+        """See `Communicator`.  Raises StudyError."""
         raise StudyError(NO_INERTIA)
 
-    def posed(self, problem: Problem) -> Matrixless:
-        """See `Share`."""
-        return Matrixless(problem, self.levels, self.iteration)
+    def distribute(self, problem: Problem) -> MatrixFreeProblem:
+        """See `Communicator`."""
+        return MatrixFreeProblem(problem, self.levels, self.iteration)
 
 
 @dataclass(frozen=True, eq=False)
-class Matrixless:
-    """A problem as Newton's method sees it, whose tangent is no matrix."""
+class MatrixFreeProblem:
+    """A problem with a matrix-free tangent."""
 
     problem: Problem
-    levels: Levels
-    iteration: Iteration
+    levels: MultigridLevels
+    iteration: KrylovSettings
 
     @property
     def equations(self) -> Problem:
@@ -176,7 +178,7 @@ class Matrixless:
         """See `Problem`."""
         return self.problem.fields(name, x)
 
-    def at(self, x: Array) -> Matrixless:
+    def at(self, x: Array) -> MatrixFreeProblem:
         """See `Problem`: it has no elements that are sought."""
         return self
 
@@ -189,11 +191,11 @@ class Matrixless:
         """See `Problem`."""
         return self.problem.residual(x)
 
-    def linearise(self, x: Array) -> tuple[Array, Tangent]:
+    def linearise(self, x: Array) -> tuple[Array, MatrixFreeOperator]:
         """See `Problem`."""
         problem = self.problem
         r = problem.assembler.residual(x, problem.parameters)
-        tangent = Tangent.of(problem, self.levels, self.iteration, self.ties, x)
+        tangent = MatrixFreeOperator.of(problem, self.levels, self.iteration, self.ties, x)
         defect = np.zeros_like(r)
         defect[problem.fixed] = x[problem.fixed] - problem.values
         if defect.any():

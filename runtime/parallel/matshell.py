@@ -1,4 +1,4 @@
-"""The tangent as a shell matrix of PETSc: products of each process, and multigrid in the order.
+"""Matrix-free tangent as a shell matrix of PETSc, with p-multigrid.
 
 PETSc has the Krylov method, Chebyshev's smoothing and the cycle. Ours are the products, the
 interpolation from the next lower order and the matrix there, which algebraic multigrid solves.
@@ -18,18 +18,18 @@ from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.discretisation import matrix_free_operator as alone
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.constraints import Ties
-from softehl.runtime.discretisation.p_multigrid import Levels
+from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.mpi import petsc, world
-from softehl.runtime.parallel.halo_exchange import Exchange
+from softehl.runtime.parallel.halo_exchange import HaloExchange
 from softehl.runtime.parallel.matrix_free import TOLERANCE, ties_of
-from softehl.runtime.parallel.petsc_matrix import Solver, Times
+from softehl.runtime.parallel.petsc_matrix import PetscSolver, SolverTimes
 from softehl.runtime.solve.linear.coarse_grid_solver import DIRECT_BELOW
 from softehl.runtime.solve.linear.multigrid import DEGREE
 
 
 @dataclass(eq=False)
-class Shell:
+class MatrixFreeShell:
     """The tangent of a problem that is spread over processes; see `parallel.petsc_matrix.Tangent`.
 
     held: (k,) whether an own unknown is prescribed. ties: what moves, where there are none. local:
@@ -37,11 +37,11 @@ class Shell:
     """
 
     problem: Problem
-    levels: Levels
-    exchange: Exchange
+    levels: MultigridLevels
+    exchange: HaloExchange
     held: Flags = field(init=False)
     ties: Ties = field(init=False)
-    local: alone.Tangent = field(init=False)
+    local: alone.MatrixFreeOperator = field(init=False)
     matrix: Any = field(init=False)
     own: Array = field(init=False)
 
@@ -59,13 +59,13 @@ class Shell:
         x: Array,
         parameters: Mapping[str, Array],
         defect: Array,
-        times: Times,
+        times: SolverTimes,
     ) -> Array:
         """Evaluate all elements at x, (m,); their residuals with K times defect taken off, (m,)."""
         began, problem = time.perf_counter(), self.problem
         r = assembler.residual(x, parameters)
-        once = alone.Iteration(0.0, 0)
-        self.local = alone.Tangent.of(problem, self.levels, once, self.ties, x)
+        once = alone.KrylovSettings(0.0, 0)
+        self.local = alone.MatrixFreeOperator.of(problem, self.levels, once, self.ties, x)
         self.own = self.exchange.added(self.local.diagonals)
         if defect.any():
             r -= self.local.times(defect)
@@ -74,7 +74,7 @@ class Shell:
 
     def mult(self, _: Any, source: Any, target: Any) -> None:
         """PETSc's call: a product, with ones for prescribed unknowns."""
-        positions = self.exchange.places
+        positions = self.exchange.positions
         x = self.exchange.local(source)
         x[self.problem.fixed] = 0.0
         y = self.exchange.added(self.local.times(x))
@@ -82,7 +82,7 @@ class Shell:
 
     def getDiagonal(self, _: Any, target: Any) -> None:
         """PETSc's call."""
-        target.array[self.exchange.places] = np.where(self.held, 1.0, self.own)
+        target.array[self.exchange.positions] = np.where(self.held, 1.0, self.own)
 
     def diagonal(self) -> Array:
         """Magnitudes of the diagonal of K, own rows, (k,)."""
@@ -92,7 +92,7 @@ class Shell:
         """K times own values x, (k,): own rows, (k,)."""
         product = self.exchange.vector.duplicate()
         self.matrix.mult(self.exchange.to_petsc(x), product)
-        return np.array(product.array_r[self.exchange.places])
+        return np.array(product.array_r[self.exchange.positions])
 
     def times_magnitudes(self, x: Array) -> Array:
         """A bound of |K| times own values x, (k,), at least 0: own rows, (k,)."""
@@ -104,11 +104,11 @@ class Shell:
         )
 
     @property
-    def rows(self) -> Exchange:
+    def rows(self) -> HaloExchange:
         """See `parallel.petsc_matrix.Operator`."""
         return self.exchange
 
-    def solved(self, solver: Solver, r: Array) -> Array:
+    def solved(self, solver: PetscSolver, r: Array) -> Array:
         """See `parallel.petsc_matrix.Operator`."""
         return solver.solve(self, r)
 
@@ -175,14 +175,14 @@ class Shell:
         exchange, lower = self.exchange, self.levels.unknowns[1]
         mask = np.isin(exchange.owned, lower)
         local = np.flatnonzero(mask)
-        return exchange.renumbered(mask)[0][lower], local[np.argsort(exchange.places[local])]
+        return exchange.renumbered(mask)[0][lower], local[np.argsort(exchange.positions[local])]
 
     def _motions(self, A: Any, near: Any, chosen: Integers) -> Any:
         """The motions at the nodes of the lower level, made orthogonal."""
         vectors: list[Any] = []
         for vector in near.getVecs():
             level_vector = A.createVecRight()
-            level_vector.array[:] = vector.array_r[self.exchange.places[chosen]]
+            level_vector.array[:] = vector.array_r[self.exchange.positions[chosen]]
             for other in vectors:
                 level_vector.axpy(-level_vector.dot(other), other)
             level_vector.normalize()

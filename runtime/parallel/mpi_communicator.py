@@ -1,4 +1,4 @@
-"""Distribution of a solution over processes, where each has its part of the equations."""
+"""MPI communicator: collective operations on a distributed solution."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.discretisation.communicator import Share
+from softehl.runtime.discretisation.communicator import Communicator
 from softehl.runtime.discretisation.constraints import concave, internal_negative
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
 from softehl.runtime.mpi import world
-from softehl.runtime.parallel.distributed_problem import Spread, Team
-from softehl.runtime.parallel.halo_exchange import largest, total
+from softehl.runtime.parallel.distributed_problem import DistributedProblem, ParallelContext
+from softehl.runtime.parallel.halo_exchange import global_max, global_sum
 from softehl.runtime.parallel.matrix_free import NO_INERTIA
 from softehl.runtime.parallel.slepc import DistributedConstraints, Pencil
 
@@ -24,10 +24,10 @@ T = TypeVar("T")
 
 
 @dataclass(eq=False)
-class Processes(Share):
-    """See `Share`: what a process of several has."""
+class MpiCommunicator(Communicator):
+    """See `Communicator`: operations of one of several processes."""
 
-    team: Team
+    team: ParallelContext
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Raises StudyError."""
@@ -37,93 +37,93 @@ class Processes(Share):
         )
 
     @property
-    def first(self) -> bool:  # type: ignore[override]
-        """See `Share`."""
+    def is_root(self) -> bool:  # type: ignore[override]
+        """See `Communicator`."""
         return bool(world().rank == 0)
 
     @property
-    def pieces(self) -> tuple[int, int]:  # type: ignore[override]
-        """See `Share`."""
+    def rank_and_size(self) -> tuple[int, int]:  # type: ignore[override]
+        """See `Communicator`."""
         return world().rank, world().size
 
-    def posed(self, problem: Problem) -> Spread:
-        """See `Share`."""
-        return Spread(problem, self.team)
+    def distribute(self, problem: Problem) -> DistributedProblem:
+        """See `Communicator`."""
+        return DistributedProblem(problem, self.team)
 
-    def whole(self, x: Array) -> Array:
-        """See `Share`."""
+    def gather(self, x: Array) -> Array:
+        """See `Communicator`."""
         part = self.team.part
         return _gathered(x[..., part.owned], part.unknowns[part.owned], self._whole.size)
 
-    def own(self, x: Array) -> Array:
-        """See `Share`."""
+    def restrict(self, x: Array) -> Array:
+        """See `Communicator`."""
         return np.asarray(x[..., self.team.part.unknowns])
 
-    def whole_cells(self, block: str, values: Array) -> Array:
-        """See `Share`."""
+    def gather_cells(self, block: str, values: Array) -> Array:
+        """See `Communicator`."""
         rows = self.team.part.elements[block]
         count = len(self._whole.blocks[block].nodes)
         return np.moveaxis(_gathered(np.moveaxis(values, 0, -1), rows, count), -1, 0)
 
-    def own_cells(self, block: str, values: Array) -> Array:
-        """See `Share`."""
+    def restrict_cells(self, block: str, values: Array) -> Array:
+        """See `Communicator`."""
         return np.asarray(values[self.team.part.elements[block]])
 
-    def whole_forces(self, forces: Array) -> Array:
-        """See `Share`."""
+    def gather_forces(self, forces: Array) -> Array:
+        """See `Communicator`."""
         part = self.team.part
         owned = self.team.exchange.added(forces)
         return _gathered(owned, part.unknowns[part.owned], self._whole.size)
 
-    def added(self, x: Array) -> Array:
-        """See `Share`."""
+    def sum_shared(self, x: Array) -> Array:
+        """See `Communicator`."""
         exchange = self.team.exchange
         return exchange.copied(exchange.added(x))
 
     def owned(self, size: int) -> Integers:
-        """See `Share`."""
+        """See `Communicator`."""
         return self.team.part.owned
 
-    def total(self, values: Array) -> Array:
-        """See `Share`."""
-        return total(values)
+    def sum(self, values: Array) -> Array:
+        """See `Communicator`."""
+        return global_sum(values)
 
-    def free(self, problem: Problem) -> DistributedConstraints:
-        """See `Share`."""
+    def constraint_map(self, problem: Problem) -> DistributedConstraints:
+        """See `Communicator`."""
         return DistributedConstraints.of(problem, self.team.part, self.team.exchange)
 
-    def part(self, posed: Spread) -> Problem:
-        """See `Share`."""
+    def local_problem(self, posed: DistributedProblem) -> Problem:
+        """See `Communicator`."""
         return posed.problem
 
-    def lowest(
+    def lowest_modes(
         self, problem: Problem, K: csc_array, M: csc_array, count: int
     ) -> tuple[Array, Array]:
-        """See `Share`."""
-        free = self.free(problem)
-        rising = concave(problem, K, self.added, lambda flag: bool(largest(float(flag))))
+        """See `Communicator`."""
+        free = self.constraint_map(problem)
+        rising = concave(problem, K, self.sum_shared, lambda flag: bool(global_max(float(flag))))
         natural = int((free.gather(rising.astype(np.float64)) > 0.0).sum())
-        negative = total(np.array([natural + internal_negative(problem, K)]))
+        negative = global_sum(np.array([natural + internal_negative(problem, K)]))
         return Pencil(free, K, M).lowest(count, int(negative[0]))
 
     def buckling(
         self, problem: Problem, K: csc_array, G: csc_array, count: int
     ) -> tuple[Array, Array]:
-        """See `Share`."""
-        return Pencil(self.free(problem), K, G).factors(count)
+        """See `Communicator`."""
+        return Pencil(self.constraint_map(problem), K, G).factors(count)
 
-    def renewed(self) -> Share:
-        """See `Share`.  Raises StudyError without matrices."""
+    def with_other_elements(self) -> Communicator:
+        """See `Communicator`.  Raises StudyError without matrices."""
         if self.team.levels is not None:
             raise StudyError(NO_INERTIA)
-        return type(self)(self.team.renewed())
+        return type(self)(self.team.with_other_elements())
 
-    def largest(self, value: float) -> float:
-        """See `Share`."""
-        return largest(value)
+    def max(self, value: float) -> float:
+        """See `Communicator`."""
+        return global_max(value)
 
-    def together(self) -> None:
-        """See `Share`."""
+    def barrier(self) -> None:
+        """See `Communicator`."""
         world().Barrier()
 
     @property
@@ -132,47 +132,47 @@ class Processes(Share):
 
 
 @dataclass(eq=False)
-class Parts(Processes):
-    """See `Share`: of a mesh in parts; there is no whole, vectors are those of a part (m,)."""
+class PartitionedMeshCommunicator(MpiCommunicator):
+    """See `Communicator`: of a partitioned mesh; vectors are those of the partition (m,)."""
 
-    def whole(self, x: Array) -> Array:
-        """See `Share`: those of the part."""
+    def gather(self, x: Array) -> Array:
+        """See `Communicator`: those of the part."""
         return x
 
-    def own(self, x: Array) -> Array:
-        """See `Share`."""
+    def restrict(self, x: Array) -> Array:
+        """See `Communicator`."""
         return x
 
-    def whole_cells(self, block: str, values: Array) -> Array:
-        """See `Share`: those of the part."""
+    def gather_cells(self, block: str, values: Array) -> Array:
+        """See `Communicator`: those of the part."""
         return values
 
-    def own_cells(self, block: str, values: Array) -> Array:
-        """See `Share`."""
+    def restrict_cells(self, block: str, values: Array) -> Array:
+        """See `Communicator`."""
         return values
 
-    def whole_forces(self, forces: Array) -> Array:
-        """See `Share`: sums at the unknowns of the part."""
-        return self.added(forces)
+    def gather_forces(self, forces: Array) -> Array:
+        """See `Communicator`: sums at the unknowns of the part."""
+        return self.sum_shared(forces)
 
     def norm(self, x: Array) -> float:
-        """See `Share`."""
+        """See `Communicator`."""
         owned = x[self.team.part.owned]
-        return float(np.sqrt(total(np.array([owned @ owned]))[0]))
+        return float(np.sqrt(global_sum(np.array([owned @ owned]))[0]))
 
-    def summed(self, values: Array, numbers: Integers) -> float:
-        """See `Share`."""
+    def sum_at(self, values: Array, numbers: Integers) -> float:
+        """See `Communicator`."""
         is_owned: Flags = np.zeros(len(values), dtype=bool)
         is_owned[self.team.part.owned] = True
-        return float(total(np.array([values[numbers[is_owned[numbers]]].sum()]))[0])
+        return float(global_sum(np.array([values[numbers[is_owned[numbers]]].sum()]))[0])
 
-    def found_each(self, values: list[T | None]) -> list[T | None]:
-        """See `Share`."""
+    def first_not_none(self, values: list[T | None]) -> list[T | None]:
+        """See `Communicator`."""
         by_process = zip(*world().allgather(values), strict=True)
         return [next((v for v in row if v is not None), None) for row in by_process]
 
-    def at_all_nodes(self, values: Array) -> Array:
-        """See `Share`."""
+    def gather_nodes(self, values: Array) -> Array:
+        """See `Communicator`."""
         piece = self.team.part.system.mesh.piece
         assert piece is not None
         by_process = world().allgather((piece.numbers, values))
@@ -190,4 +190,4 @@ def _gathered(values: Array, places: Integers, count: int) -> Array:
     flat = values.reshape(-1, values.shape[-1]) if values.ndim > 1 else values[None]
     result = np.zeros((len(flat), count))
     result[:, places] = flat
-    return np.asarray(total(result).reshape(*values.shape[:-1], count))
+    return np.asarray(global_sum(result).reshape(*values.shape[:-1], count))

@@ -1,7 +1,7 @@
 """Partition of a system: elements and unknowns of each process, and PETSc's numbers of these.
 
 The part of a process has its elements, and all unknowns that these have. The mesh is one that all
-processes have (`partition`), or it is in parts already (`part_here`).
+processes have (`partition`), or it is in parts already (`local_system_of_partitioned_mesh`).
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Tie
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.partitioning import Piece
+from softehl.runtime.mesh.partitioning import MeshPartition
 from softehl.runtime.mpi import world
-from softehl.runtime.parallel.halo_exchange import Exchange
-from softehl.runtime.parallel.linear_solver_choice import internal
+from softehl.runtime.parallel.halo_exchange import HaloExchange
+from softehl.runtime.parallel.linear_solver_choice import internal_unknowns
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +47,15 @@ class Partition:
 
 
 def main_blocks(system: System) -> list[str]:
-    """Pages whose cells have the highest dimension: what is cut into parts."""
+    """Pages whose cells have the highest dimension, and are partitioned."""
     dimension = {name: CELLS[b.kind].dimension for name, b in system.blocks.items()}
     highest = max(dimension.values())
     return [name for name, d in dimension.items() if d == highest]
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
-    """Cells to be cut into parts: those of the main blocks, each once.
+class CellGraph:
+    """Graph of the cells to be partitioned: those of the main blocks, each once.
 
     nodes: for each kind (n, k). rows: block -> number of the cell of each element.
     """
@@ -64,7 +64,7 @@ class Cells:
     rows: dict[str, Integers]
 
     @classmethod
-    def of(cls, system: System) -> Cells:
+    def of(cls, system: System) -> CellGraph:
         """Elements of several blocks on one cell stay together."""
         nodes: list[Integers] = []
         rows: dict[str, Integers] = {}
@@ -103,7 +103,7 @@ class Cells:
         return shared
 
 
-def partition(system: System, cells: Cells, main: Integers, processes: int) -> Partition:
+def partition(system: System, cells: CellGraph, main: Integers, processes: int) -> Partition:
     """The whole partition from the process of each cell, `main`."""
     elements = {name: main[rows] for name, rows in cells.rows.items()}
     node = _node_owners(system, elements, processes)
@@ -119,7 +119,7 @@ def partition(system: System, cells: Cells, main: Integers, processes: int) -> P
     for block in reversed(system.assembler.blocks):
         rows, columns = np.nonzero(without_node[block.dofs])
         owner[block.dofs[rows, columns]] = elements[block.name][rows]
-    order, interleaved = numbered(system, owner, node_of_unknown)
+    order, interleaved = petsc_ordering(system, owner, node_of_unknown)
     numbers = np.empty(len(order), dtype=np.int64)
     numbers[order] = np.arange(len(order))
     starts = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=processes))])
@@ -147,7 +147,9 @@ def nodes_of_unknowns(system: System) -> Integers:
     return node_of_unknown
 
 
-def numbered(system: System, owner: Integers, places: Integers) -> tuple[Integers, int]:
+def petsc_ordering(
+    system: System, owner: Integers, node_of_unknown: Integers
+) -> tuple[Integers, int]:
     """Unknowns in PETSc's order: by process, then those that stand on the same nodes as the first
     field together, node by node; and how many of them a node has where there are no others but
     internal ones.
@@ -161,16 +163,16 @@ def numbered(system: System, owner: Integers, places: Integers) -> tuple[Integer
             j for j, other in enumerate(present) if np.array_equal(other, mask)
         )
         kind[numbers[mask]] = k
-    order = np.lexsort((kind, places, group, owner))
-    for inner in internal(system.assembler):
+    order = np.lexsort((kind, node_of_unknown, group, owner))
+    for inner in internal_unknowns(system.assembler):
         group[inner] = 0  # condensed before PETSc sees them
     alike = not group.any() and all(np.array_equal(mask, present[0]) for mask in present)
     return order, len(nodal) if alike else 1
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """Part of a study that one process has.
+class LocalSystem:
+    """Equations of one process, and their place in the global system.
 
     system: its part of the equations, in local numbers. unknowns: (m,) number of each of its
     unknowns in the whole system, rising. elements: block -> number of each of its elements.
@@ -183,7 +185,7 @@ class Part:
     owned: Integers
 
 
-def part_of(system: System, partition: Partition, process: int) -> Part:
+def part_of(system: System, partition: Partition, process: int) -> LocalSystem:
     """The part of one process."""
     elements = {n: np.flatnonzero(ranks == process) for n, ranks in partition.elements.items()}
     owners = partition.owners
@@ -203,7 +205,9 @@ def part_of(system: System, partition: Partition, process: int) -> Part:
         implied=tuple(_implied(force, numbering) for force in system.implied),
         whole=system,
     )
-    return Part(local_system, unknowns, elements, np.flatnonzero(owners[unknowns] == process))
+    return LocalSystem(
+        local_system, unknowns, elements, np.flatnonzero(owners[unknowns] == process)
+    )
 
 
 def _numbering(whole: Numbering, local: Integers, elements: dict[str, Integers]) -> Numbering:
@@ -222,8 +226,8 @@ def _elements(block: ElementBlock, local: Integers, rows: Integers) -> ElementBl
     changes: dict[str, Any] = {"dofs": np.ascontiguousarray(local[block.dofs[rows]])}
     if len(block.coordinates):
         changes["coordinates"] = block.coordinates[rows]
-    changes["data"] = _chosen(block.data, rows)
-    changes["point_data"] = _chosen(block.point_data, rows)
+    changes["data"] = _rows_or_none(block.data, rows)
+    changes["point_data"] = _rows_or_none(block.point_data, rows)
     return replace(block, **changes)
 
 
@@ -233,7 +237,7 @@ def _page(block: Block, rows: Integers) -> Block:
         nodes=block.nodes[rows],
         form=replace(block.form, along={n: p[rows] for n, p in block.form.places.items()}),
         data={name: values[rows] for name, values in block.data.items()},
-        initial=_chosen(block.initial, rows),
+        initial=_rows_or_none(block.initial, rows),
     )
 
 
@@ -242,11 +246,13 @@ def _implied(force: Force, numbering: Numbering) -> Force:
     return replace(force, nodes=force.nodes[mask])
 
 
-def _chosen(values: Array | None, rows: Integers) -> Array | None:
+def _rows_or_none(values: Array | None, rows: Integers) -> Array | None:
     return None if values is None else values[rows]
 
 
-def part_here(system: System, piece: Piece) -> tuple[Part, Exchange, int]:
+def local_system_of_partitioned_mesh(
+    system: System, piece: MeshPartition
+) -> tuple[LocalSystem, HaloExchange, int]:
     """Part and exchange of this process, and the unknowns of every node where all have as many.
 
     Raises StudyError for what goes beyond a part.
@@ -254,19 +260,19 @@ def part_here(system: System, piece: Piece) -> tuple[Part, Exchange, int]:
     _require_possible(system)
     comm = world()
     is_owned, shared = _owned(system, piece), _for_all(system)
-    order, interleaved = numbered(system, np.where(is_owned, 0, 1), nodes_of_unknowns(system))
+    order, interleaved = petsc_ordering(system, np.where(is_owned, 0, 1), nodes_of_unknowns(system))
     count = int(is_owned.sum())
     starts = np.concatenate([[0], np.cumsum(comm.allgather(count))])
     numbers = np.full(system.size, -1)
     numbers[order[:count]] = starts[comm.rank] + np.arange(count)
     for name, values in system.numbering.nodal.items():
-        _ask(numbers, values, piece, name)
+        _number_halo(numbers, values, piece, name)
     numbers[shared] = comm.bcast(numbers[shared])
     rows = {name: np.arange(len(block.nodes)) for name, block in system.blocks.items()}
     for block in system.assembler.blocks:
         rows.setdefault(block.name, np.arange(len(block.dofs)))
-    part = Part(system, np.arange(system.size), rows, np.flatnonzero(is_owned))
-    exchange = Exchange.of(numbers, part.owned, starts)
+    part = LocalSystem(system, np.arange(system.size), rows, np.flatnonzero(is_owned))
+    exchange = HaloExchange.of(numbers, part.owned, starts)
     return part, exchange, min(comm.allgather(interleaved))
 
 
@@ -279,11 +285,11 @@ def _require_possible(system: System) -> None:
             raise StudyError(f"{name!r} has no elements, on any process")
 
 
-def _owned(system: System, piece: Piece) -> Flags:
+def _owned(system: System, piece: MeshPartition) -> Flags:
     """(n,): whether an unknown is this process's is_owned: no process before it has the unknown."""
     is_owned: Flags = np.ones(system.size, dtype=bool)
     for numbers in system.numbering.nodal.values():
-        for process, flags in piece.told(numbers >= 0).items():
+        for process, flags in piece.exchange(numbers >= 0).items():
             if process < world().rank:
                 both = numbers[piece.shared[process][flags]]
                 is_owned[both[both >= 0]] = False
@@ -300,10 +306,12 @@ def _for_all(system: System) -> Integers:
     return np.array([layout.part(name).start for name in names], dtype=np.int64)
 
 
-def _ask(numbers: Array | Integers, nodal: Integers, piece: Piece, name: str) -> None:
-    """Put PETSc's numbers of an unknown at nodes of others into `numbers`."""
+def _number_halo(
+    numbers: Array | Integers, nodal: Integers, piece: MeshPartition, name: str
+) -> None:
+    """Put PETSc's numbers of halo unknowns into `numbers`."""
     local_numbers = np.where(nodal >= 0, numbers[nodal], -1)
-    for process, other_numbers in piece.told(local_numbers).items():
+    for process, other_numbers in piece.exchange(local_numbers).items():
         unknowns = nodal[piece.shared[process]]
         mask = (unknowns >= 0) & (other_numbers >= 0)
         numbers[unknowns[mask]] = other_numbers[mask]

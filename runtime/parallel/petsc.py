@@ -13,13 +13,19 @@ from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.loads import Tie
 from softehl.runtime.equations.system import System
 from softehl.runtime.mpi import petsc, world
-from softehl.runtime.parallel.distributed_problem import Distributed, Team
-from softehl.runtime.parallel.halo_exchange import Exchange
-from softehl.runtime.parallel.matrix_free import levels_of, suitable
-from softehl.runtime.parallel.mpi_communicator import Parts, Processes
-from softehl.runtime.parallel.partitioning import Cells, Part, part_here, part_of, partition
-from softehl.runtime.parallel.petsc_matrix import Solver, Times
-from softehl.runtime.parallel.static_condensation import Outer
+from softehl.runtime.parallel.distributed_problem import DistributedSolver, ParallelContext
+from softehl.runtime.parallel.halo_exchange import HaloExchange
+from softehl.runtime.parallel.matrix_free import levels_of, require_products
+from softehl.runtime.parallel.mpi_communicator import MpiCommunicator, PartitionedMeshCommunicator
+from softehl.runtime.parallel.partitioning import (
+    CellGraph,
+    LocalSystem,
+    local_system_of_partitioned_mesh,
+    part_of,
+    partition,
+)
+from softehl.runtime.parallel.petsc_matrix import PetscSolver, SolverTimes
+from softehl.runtime.parallel.static_condensation import ExternalUnknowns
 from softehl.runtime.solve.newton import Newton
 
 _AXES = ("x", "y", "z")
@@ -47,7 +53,7 @@ class Petsc:
 
     options: Mapping[str, object] = field(default_factory=dict)
     matrix_free: bool = False
-    times: Times = field(default_factory=Times)
+    times: SolverTimes = field(default_factory=SolverTimes)
 
     def __post_init__(self) -> None:
         petsc()
@@ -60,25 +66,29 @@ class Petsc:
         if system.mesh.piece is not None:
             if self.matrix_free:
                 system.mesh.require_whole('linear = "matrix-free"')
-            part, exchange, interleaved = part_here(system, system.mesh.piece)
-            return replace(system, share=Parts(self._team(part, exchange, interleaved)))
+            part, exchange, interleaved = local_system_of_partitioned_mesh(
+                system, system.mesh.piece
+            )
+            return replace(
+                system, comm=PartitionedMeshCommunicator(self._team(part, exchange, interleaved))
+            )
         order = self._order(system)
         comm = world()
-        cells = Cells.of(system)
+        cells = CellGraph.of(system)
         cut = partition(system, cells, _cut(system, cells), comm.size)
         part = part_of(system, cut, comm.rank)
-        exchange = Exchange.of(cut.numbers[part.unknowns], part.owned, cut.starts)
+        exchange = HaloExchange.of(cut.numbers[part.unknowns], part.owned, cut.starts)
         team = self._team(part, exchange, cut.interleaved)
         if order:
             pages = [part.system.assembler.block(name) for name in system.blocks]
             team.levels = levels_of(part.system, pages, order, 1)
-        return replace(part.system, share=Processes(team))
+        return replace(part.system, comm=MpiCommunicator(team))
 
-    def _team(self, part: Part, exchange: Exchange, interleaved: int) -> Team:
-        outer = Outer.of(exchange, part.system.assembler)
+    def _team(self, part: LocalSystem, exchange: HaloExchange, interleaved: int) -> ParallelContext:
+        outer = ExternalUnknowns.of(exchange, part.system.assembler)
         nullspace = _rigid_motions(part, interleaved, outer)
-        solver = Solver(self.options, nullspace, _fields(part, outer), self.times)
-        return Team(part, exchange, outer, interleaved, solver)
+        solver = PetscSolver(self.options, nullspace, _fields(part, outer), self.times)
+        return ParallelContext(part, exchange, outer, interleaved, solver)
 
     def _order(self, system: System) -> int:
         """Order of the cells of pages with products, 0 for a matrix.  Raises StudyError."""
@@ -88,14 +98,14 @@ class Petsc:
             raise StudyError(
                 'linear = "matrix-free": ties are taken in one process, leave engine out'
             )
-        return suitable(system)[1]
+        return require_products(system)[1]
 
     def newton(self, system: System, given: Newton | None) -> Newton:
         """See `Engine`."""
-        return replace(given or Newton(), linear=Distributed())
+        return replace(given or Newton(), linear=DistributedSolver())
 
 
-def _cut(system: System, cells: Cells) -> Integers:
+def _cut(system: System, cells: CellGraph) -> Integers:
     """Process of each cell, by PETSc's partitioner."""
     PETSc, comm = petsc(), world()
     if comm.size == 1:
@@ -115,7 +125,7 @@ def _cut(system: System, cells: Cells) -> Integers:
     return np.concatenate(comm.allgather(processes.getIndices().astype(np.int64)))
 
 
-def _rigid_motions(part: Part, interleaved: int, outer: Outer) -> Any:
+def _rigid_motions(part: LocalSystem, interleaved: int, outer: ExternalUnknowns) -> Any:
     """Rigid-body motions for multigrid, where the only unknowns are displacements; else None."""
     mesh, owned = part.system.mesh, outer.owned
     parts = _spans(part, owned)
@@ -135,7 +145,7 @@ def _rigid_motions(part: Part, interleaved: int, outer: Outer) -> Any:
     return petsc().NullSpace().createRigidBody(vector)
 
 
-def _spans(part: Part, own: Integers) -> dict[str, Flags]:
+def _spans(part: LocalSystem, own: Integers) -> dict[str, Flags]:
     """Unknown -> which of own ones, by their local numbers, are of that name; no internal ones."""
     layout, blocks = part.system.numbering.layout, part.system.assembler.blocks
     inner = {name for block in blocks for name in block.internal}
@@ -143,11 +153,11 @@ def _spans(part: Part, own: Integers) -> dict[str, Flags]:
     return {name: (own >= span.start) & (own < span.stop) for name, span in spans.items()}
 
 
-def _fields(part: Part, outer: Outer) -> dict[str, Integers]:
+def _fields(part: LocalSystem, outer: ExternalUnknowns) -> dict[str, Integers]:
     """Field -> where its own unknowns stand in this process's piece; displacements are one."""
     fields: dict[str, list[Integers]] = {}
     for name, mask in _spans(part, outer.owned).items():
         stem, _, axis = name.rpartition("_")
         label = stem if stem and axis in (*_AXES, "r") else name
-        fields.setdefault(label, []).append(outer.exchange.places[mask])
+        fields.setdefault(label, []).append(outer.exchange.positions[mask])
     return {label: np.sort(np.concatenate(positions)) for label, positions in fields.items()}

@@ -1,4 +1,4 @@
-"""The tangent as a matrix of PETSc, filled from batches of element tangents, and its solution."""
+"""Assembled tangent as a PETSc matrix, and its solution."""
 
 from __future__ import annotations
 
@@ -14,8 +14,13 @@ from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.sparsity import Structure
 from softehl.runtime.mpi import petsc, world
-from softehl.runtime.parallel.halo_exchange import Exchange
-from softehl.runtime.parallel.static_condensation import Columns, Outer, Piece, require_eliminated
+from softehl.runtime.parallel.halo_exchange import HaloExchange
+from softehl.runtime.parallel.static_condensation import (
+    CondensedElements,
+    ExternalUnknowns,
+    InternalColumns,
+    require_eliminated,
+)
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 
 DIRECT_BELOW = 200_000
@@ -23,7 +28,7 @@ DIRECT_BELOW = 200_000
 
 
 @dataclass(eq=False)
-class Times:
+class SolverTimes:
     """Seconds of this process: in kernels, in putting their results into the matrix, in solving."""
 
     kernels: float = 0.0
@@ -34,7 +39,7 @@ class Times:
 
 
 @dataclass(eq=False)
-class Tangent:
+class PetscMatrix:
     """The matrix that element blocks share: its structure is told PETSc once for a set of
     prescribed unknowns, whose rows and columns are dropped by negative numbers. Internal unknowns
     of elements are condensed before.
@@ -49,23 +54,28 @@ class Tangent:
     values: Array
     fixed: Integers
     structure: Structure
-    columns: dict[str, Columns]
-    exchange: Exchange
-    outer: Outer
-    pieces: list[Piece] = field(default_factory=list)
+    columns: dict[str, InternalColumns]
+    exchange: HaloExchange
+    outer: ExternalUnknowns
+    pieces: list[CondensedElements] = field(default_factory=list)
     own: Array = field(default_factory=lambda: np.empty(0))
 
     @classmethod
     def of(
-        cls, assembler: Assembler, fixed: Integers, exchange: Exchange, outer: Outer, block: int
-    ) -> Tangent:
+        cls,
+        assembler: Assembler,
+        fixed: Integers,
+        exchange: HaloExchange,
+        outer: ExternalUnknowns,
+        block: int,
+    ) -> PetscMatrix:
         """An empty matrix; `fixed` are local numbers of prescribed unknowns."""
         PETSc = petsc()
         petsc_numbers = np.full(len(exchange.numbers), -1, dtype=PETSc.IntType)
-        petsc_numbers[outer.kept] = outer.exchange.numbers
+        petsc_numbers[outer.local_numbers] = outer.exchange.numbers
         owned_numbers = petsc_numbers[outer.owned]
         petsc_numbers[fixed] = -1
-        columns = {b.name: Columns.of(b) for b in assembler.blocks if b.internal}
+        columns = {b.name: InternalColumns.of(b) for b in assembler.blocks if b.internal}
         maps = [
             petsc_numbers[b.dofs[:, columns[b.name].outer] if b.internal else b.dofs]
             for b in assembler.blocks
@@ -88,7 +98,7 @@ class Tangent:
         return self.structure is assembler.structure and np.array_equal(self.fixed, fixed)
 
     @property
-    def rows(self) -> Exchange:
+    def rows(self) -> HaloExchange:
         """Of PETSc's vectors."""
         return self.outer.exchange
 
@@ -109,7 +119,7 @@ class Tangent:
         x: Array,
         parameters: Mapping[str, Array],
         defect: Array,
-        times: Times,
+        times: SolverTimes,
     ) -> Array:
         """Evaluate all elements at x, (m,); their residuals with K times defect taken off, (m,)."""
         r, began = np.zeros(assembler.size), time.perf_counter()
@@ -141,13 +151,13 @@ class Tangent:
         columns = self.columns.get(piece.name)
         if columns is None:
             return K
-        condensed = Piece.of(columns, piece.dofs, K, free)
+        condensed = CondensedElements.of(columns, piece.dofs, K, free)
         self.pieces.append(condensed)
         return np.asarray(
-            K[:, columns.outer][:, :, columns.outer] - condensed.back @ condensed.slopes
+            K[:, columns.outer][:, :, columns.outer] - condensed.back @ condensed.coupling
         )
 
-    def solved(self, solver: Solver, r: Array) -> Array:
+    def solved(self, solver: PetscSolver, r: Array) -> Array:
         """Local x (m,) of K x = r, own values (k,).  Raises SingularMatrix on all processes."""
         if not self.columns:
             return solver.solve(self, r)
@@ -159,7 +169,7 @@ class Tangent:
             piece.eliminate(right)
         x = np.zeros(len(right))
         left = exchange.copied(exchange.added(right))
-        x[self.outer.kept] = solver.solve(self, left[self.outer.owned])
+        x[self.outer.local_numbers] = solver.solve(self, left[self.outer.owned])
         for piece in self.pieces:
             piece.recover(x, original)
         return x
@@ -190,7 +200,7 @@ class Tangent:
         target, source = rows.vector.duplicate(), rows.to_petsc(local[self.outer.owned])
         matrix.mult(source, target)
         y = np.zeros(len(local))
-        y[self.outer.owned] = target.array_r[rows.places]
+        y[self.outer.owned] = target.array_r[rows.positions]
         target.destroy()
         source.destroy()
         if self.columns:
@@ -223,14 +233,14 @@ class Tangent:
         starts, _, values = self.matrix.getValuesCSR()
         sums = np.add.reduceat(np.append(np.abs(values), 0.0), starts[:-1])
         sums[starts[:-1] == starts[1:]] = 0.0
-        empty = self.outer.owned[sums[self.rows.places] == 0.0]
+        empty = self.outer.owned[sums[self.rows.positions] == 0.0]
         first = int(self.exchange.numbers[empty].min()) if len(empty) else -1
         return next((n for n in world().allgather(first) if n >= 0), -1)
 
 
-class Operator(Protocol):
-    """A tangent that is spread over processes, as `Solver` and Newton's method see it: `Tangent`,
-    which says what its methods do, or `parallel.matshell.Shell`.
+class DistributedOperator(Protocol):
+    """Interface of a distributed tangent to `PetscSolver` and Newton's method: `PetscMatrix`, whose
+    docstrings describe the methods, or `MatrixFreeShell`.
     """
 
     @property
@@ -239,16 +249,16 @@ class Operator(Protocol):
         ...
 
     @property
-    def exchange(self) -> Exchange:
+    def exchange(self) -> HaloExchange:
         """Of all unknowns."""
         ...
 
     @property
-    def rows(self) -> Exchange:
+    def rows(self) -> HaloExchange:
         """Of PETSc's vectors."""
         ...
 
-    def solved(self, solver: Solver, r: Array) -> Array:
+    def solved(self, solver: PetscSolver, r: Array) -> Array:
         """See the class."""
         ...
 
@@ -258,7 +268,7 @@ class Operator(Protocol):
         x: Array,
         parameters: Mapping[str, Array],
         defect: Array,
-        times: Times,
+        times: SolverTimes,
     ) -> Array:
         """See the class."""
         ...
@@ -285,7 +295,7 @@ class Operator(Protocol):
 
 
 @dataclass(eq=False)
-class Solver:
+class PetscSolver:
     """Krylov method and preconditioner, by PETSc's options; the default of a matrix is MUMPS below
     `DIRECT_BELOW` unknowns and GMRES with algebraic multigrid above.
 
@@ -296,10 +306,10 @@ class Solver:
     options: Mapping[str, object]
     near: Any = None
     fields: Mapping[str, Integers] = field(default_factory=dict)
-    times: Times = field(default_factory=Times)
+    times: SolverTimes = field(default_factory=SolverTimes)
     _ksp: Any = field(default=None, init=False, repr=False)
 
-    def solve(self, tangent: Operator, r: Array) -> Array:
+    def solve(self, tangent: DistributedOperator, r: Array) -> Array:
         """Local x of the matrix for own values r, both of `rows`.
 
         Raises SingularMatrix on all processes.
@@ -313,7 +323,7 @@ class Solver:
             ksp.solve(b, x)
             reason = ksp.getConvergedReason()
         except petsc().Error as error:
-            raise SingularMatrix(f"PETSc: {_words(error)}") from None
+            raise SingularMatrix(f"PETSc: {_error_message(error)}") from None
         finally:
             self.times.solver += time.perf_counter() - began
         self.times.solves += 1
@@ -335,18 +345,18 @@ class Solver:
         return self._ksp is not None and self._ksp.getType() == "preonly"
 
     def reset(self) -> None:
-        """Forget what belongs to another matrix."""
+        """Destroy the solver of another matrix."""
         if self._ksp is not None:
             self._ksp.destroy()
         self._ksp = None
 
-    def _prepared(self, tangent: Operator) -> Any:
+    def _prepared(self, tangent: DistributedOperator) -> Any:
         if self._ksp is None:
             self._ksp = self._new(tangent)
         self._ksp.setOperators(tangent.matrix)
         return self._ksp
 
-    def _new(self, tangent: Operator) -> Any:
+    def _new(self, tangent: DistributedOperator) -> Any:
         PETSc = petsc()
         ksp = PETSc.KSP().create(world())
         pc = ksp.getPC()
@@ -365,6 +375,6 @@ class Solver:
         return ksp
 
 
-def _words(error: BaseException) -> str:
-    """Message of PETSc's error, after the calls that led there."""
+def _error_message(error: BaseException) -> str:
+    """Message of PETSc's error without the call stack."""
     return " ".join(str(error).split()).rsplit("] ", 1)[-1]

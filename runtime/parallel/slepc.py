@@ -14,8 +14,8 @@ from softehl.runtime.discretisation.loads import Tie
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
 from softehl.runtime.mpi import petsc, slepc, world
-from softehl.runtime.parallel.halo_exchange import Exchange, largest, total
-from softehl.runtime.parallel.partitioning import Part
+from softehl.runtime.parallel.halo_exchange import HaloExchange, global_max, global_sum
+from softehl.runtime.parallel.partitioning import LocalSystem
 from softehl.runtime.solve.eigen import (
     NoModes,
     below,
@@ -31,16 +31,18 @@ from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 class DistributedConstraints:
     """As `discretisation.constraints.Constraints`, of the vectors of one process.
 
-    there: local numbers of unknowns that move. exchange: of these, where tied ones have the number
+    free: local numbers of unknowns that move. exchange: of these, where tied ones have the number
     of the first of them.
     """
 
     size: int
-    there: Integers
-    exchange: Exchange
+    free: Integers
+    exchange: HaloExchange
 
     @classmethod
-    def of(cls, problem: Problem, part: Part, exchange: Exchange) -> DistributedConstraints:
+    def of(
+        cls, problem: Problem, part: LocalSystem, exchange: HaloExchange
+    ) -> DistributedConstraints:
         """Of the local part of a problem."""
         constrained = np.zeros(problem.assembler.size)
         constrained[problem.fixed] = 1.0
@@ -52,20 +54,20 @@ class DistributedConstraints:
         numbers, starts = first.renumbered(mask)
         free = np.flatnonzero(numbers >= 0)
         owned = np.searchsorted(free, first.owned[mask])
-        return cls(len(constrained), free, Exchange.of(numbers[free], owned, starts))
+        return cls(len(constrained), free, HaloExchange.of(numbers[free], owned, starts))
 
     def gather(self, forces: Array) -> Array:
         """T' f: own sums over all processes of forces (m,) that the elements of each have."""
-        return self.exchange.added(forces[self.there])
+        return self.exchange.added(forces[self.free])
 
     def spread(self, z: Array) -> Array:
         """T z: unknowns (m,) of own free ones."""
         x = np.zeros(self.size)
-        x[self.there] = self.exchange.copied(z)
+        x[self.free] = self.exchange.copied(z)
         return x
 
 
-def _tied(part: Part, exchange: Exchange) -> Exchange:
+def _tied(part: LocalSystem, exchange: HaloExchange) -> HaloExchange:
     """The exchange of a part in which each unknown is the first of those that it is tied to."""
     global_system = part.system.everywhere
     pairs = [b.dofs[:, :2] for b in global_system.assembler.blocks if isinstance(b.kernel, Tie)]
@@ -77,7 +79,7 @@ def _tied(part: Part, exchange: Exchange) -> Exchange:
     comm = world()
     counts = comm.allgather(len(part.owned))
     starts = np.concatenate([[0], np.cumsum(counts)])
-    return Exchange.of(numbers[first[part.unknowns]], part.owned[is_master], starts)
+    return HaloExchange.of(numbers[first[part.unknowns]], part.owned[is_master], starts)
 
 
 def _first(pairs: Integers, n: int) -> Integers:
@@ -87,7 +89,7 @@ def _first(pairs: Integers, n: int) -> Integers:
     return np.asarray(first[inverse], dtype=np.int64)
 
 
-def _all_numbers(whole: System, part: Part, exchange: Exchange) -> Integers:
+def _all_numbers(whole: System, part: LocalSystem, exchange: HaloExchange) -> Integers:
     """PETSc's number of each unknown of the whole."""
     result = np.zeros(whole.size, dtype=np.int64)
     for unknowns, numbers in world().allgather(
@@ -103,25 +105,25 @@ _PREFIX = "softehl_eigen_"
 
 @dataclass(frozen=True, eq=False)
 class Pencil:
-    """Two matrices of free unknowns, each the sum of what the processes have (m, m)."""
+    """Matrix pencil of the free unknowns, each matrix the sum of those of the processes (m, m)."""
 
     free: DistributedConstraints
     K: csc_array
     M: csc_array
 
     @property
-    def exchange(self) -> Exchange:
+    def exchange(self) -> HaloExchange:
         """Of free unknowns."""
         return self.free.exchange
 
     def lowest(self, count: int, saddle: int) -> tuple[Array, Array]:
         """See `solve.eigen.lowest`; vectors (count, m) of the unknowns of this process."""
         K, M = (self.free.gather(A.diagonal()) for A in (self.K, self.M))
-        require_count(count, int(total(np.array([float((M > 0.0).sum())]))[0]))
-        ratio = largest(float(np.abs(K[M > 0.0] / M[M > 0.0]).max(initial=0.0)))
+        require_count(count, int(global_sum(np.array([float((M > 0.0).sum())]))[0]))
+        ratio = global_max(float(np.abs(K[M > 0.0] / M[M > 0.0]).max(initial=0.0)))
         eps, factors = self._shifted(count)
         below(lambda shift: factors.at(eps, shift), self._nearly_singular, ratio, saddle)
-        values, vectors = _solved(eps, count, "modes")
+        values, vectors = _eigenpairs(eps, count, "modes")
         mass, order = eps.getOperators()[1], np.argsort(values.real)[:count]
         modes = np.empty((len(order), self.free.size))
         for mode, k in zip(modes, order, strict=True):
@@ -132,7 +134,7 @@ class Pencil:
             mass.mult(shape, right)
             shape.scale(1.0 / np.sqrt(shape.dot(right)))
             mode[:] = self._local(shape)
-        size = total(terms(self.K, modes))
+        size = global_sum(terms(self.K, modes))
         return without_rounding(values.real[order], size), signed(modes)
 
     def factors(self, count: int) -> tuple[Array, Array]:
@@ -141,20 +143,20 @@ class Pencil:
         eps.setProblemType(slepc().EPS.ProblemType.GNHEP)
         eps.setWhichEigenpairs(slepc().EPS.Which.LARGEST_REAL)
         _factorised(eps.getST().getKSP(), "lu")
-        values, vectors = _solved(eps, count, "buckling factors")
+        values, vectors = _eigenpairs(eps, count, "buckling factors")
         factors, order = buckling_factors(values)
         modes = signed(np.stack([self._local(vectors[k]) for k in order[:count]]))
-        sizes = [largest(float(np.abs(mode).max(initial=0.0))) for mode in modes]
+        sizes = [global_max(float(np.abs(mode).max(initial=0.0))) for mode in modes]
         return factors[:count], modes / np.array(sizes)[:, None]
 
-    def _shifted(self, count: int) -> tuple[Any, _Factors]:
+    def _shifted(self, count: int) -> tuple[Any, _ShiftedFactors]:
         eps = self._solver(count, self._matrix(self.K), self._matrix(self.M))
         eps.setProblemType(slepc().EPS.ProblemType.GHEP)
         eps.setWhichEigenpairs(slepc().EPS.Which.TARGET_MAGNITUDE)
         eps.getST().setType("sinvert")
         ksp = eps.getST().getKSP()
         _factorised(ksp, "cholesky")
-        return eps, _Factors(ksp, self.exchange)
+        return eps, _ShiftedFactors(ksp, self.exchange)
 
     def _solver(self, count: int, A: Any, B: Any) -> Any:
         eps = slepc().EPS().create(world())
@@ -169,7 +171,7 @@ class Pencil:
         """T' A T as a matrix of PETSc's."""
         PETSc, entries = petsc(), coo_array(symmetric(A))
         numbers = np.full(self.free.size, -1, dtype=PETSc.IntType)
-        numbers[self.free.there] = self.exchange.numbers
+        numbers[self.free.free] = self.exchange.numbers
         matrix, sizes = PETSc.Mat().create(comm=world()), self.exchange.vector.getSizes()
         matrix.setSizes((sizes, sizes), 1)
         matrix.setType("aij")
@@ -178,25 +180,25 @@ class Pencil:
         return matrix
 
     def _local(self, vector: Any) -> Array:
-        return self.free.spread(np.array(vector.array_r[self.exchange.places]))
+        return self.free.spread(np.array(vector.array_r[self.exchange.positions]))
 
-    def _nearly_singular(self, factors: _Factors) -> bool:
+    def _nearly_singular(self, factors: _ShiftedFactors) -> bool:
         """See `solve.eigen.nearly_singular`."""
         b = np.random.default_rng(world().rank).uniform(-1.0, 1.0, len(self.exchange.owned))
         x = self.free.spread(factors.solve(b))
         size = self.free.gather(abs(self.K) @ np.abs(x))
-        largest_entries = [largest(float(np.abs(v).max(initial=0.0))) for v in (b, size)]
+        largest_entries = [global_max(float(np.abs(v).max(initial=0.0))) for v in (b, size)]
         return bool(largest_entries[0] <= 1e-11 * largest_entries[1])
 
 
 @dataclass(frozen=True, eq=False)
-class _Factors:
+class _ShiftedFactors:
     """Of a shifted matrix; see `solve.eigen.Pivots`."""
 
     ksp: Any
-    exchange: Exchange
+    exchange: HaloExchange
 
-    def at(self, eps: Any, shift: float) -> _Factors:
+    def at(self, eps: Any, shift: float) -> _ShiftedFactors:
         """With another shift.  Raises SingularMatrix."""
         eps.setTarget(shift)
         eps.getST().setShift(shift)
@@ -216,7 +218,7 @@ class _Factors:
         source = self.exchange.to_petsc(b)
         target = source.duplicate()
         self.ksp.solve(source, target)
-        return np.array(target.array_r[self.exchange.places])
+        return np.array(target.array_r[self.exchange.positions])
 
 
 def _factorised(ksp: Any, kind: str) -> None:
@@ -229,7 +231,7 @@ def _factorised(ksp: Any, kind: str) -> None:
     pc.setFactorSolverType("mumps")
 
 
-def _solved(eps: Any, count: int, name: str) -> tuple[Array, list[Any]]:
+def _eigenpairs(eps: Any, count: int, name: str) -> tuple[Array, list[Any]]:
     """Eigenvalues, complex ones, and vectors.  Raises NoModes, SingularMatrix."""
     eps.setFromOptions()
     try:

@@ -17,26 +17,26 @@ from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.mpi import world
-from softehl.runtime.parallel.halo_exchange import Exchange
-from softehl.runtime.parallel.linear_solver_choice import internal
+from softehl.runtime.parallel.halo_exchange import HaloExchange
+from softehl.runtime.parallel.linear_solver_choice import internal_unknowns
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
-from softehl.runtime.solve.linear.static_condensation import inverses, weakest
+from softehl.runtime.solve.linear.static_condensation import inverses, most_singular
 
 
 @dataclass(frozen=True, eq=False)
-class Outer:
+class ExternalUnknowns:
     """Unknowns of PETSc's vectors: all but internal ones.
 
-    kept: (k,) local numbers. exchange: of these, numbered as they stand there.
+    local_numbers: (k,) local numbers. exchange: of these, numbered as they stand there.
     """
 
-    kept: Integers
-    exchange: Exchange
+    local_numbers: Integers
+    exchange: HaloExchange
 
     @classmethod
-    def of(cls, exchange: Exchange, assembler: Assembler) -> Outer:
+    def of(cls, exchange: HaloExchange, assembler: Assembler) -> ExternalUnknowns:
         """Of local unknowns (m,), with elements that may have internal ones."""
-        inner = internal(assembler)
+        inner = internal_unknowns(assembler)
         if not inner:
             return cls(np.arange(len(exchange.numbers)), exchange)
         outer: Flags = np.ones(len(exchange.numbers), dtype=bool)
@@ -45,23 +45,23 @@ class Outer:
         external, owned_external = np.flatnonzero(outer), outer[exchange.owned]
         numbers, starts = exchange.renumbered(owned_external)
         owned = (np.cumsum(outer) - 1)[exchange.owned[owned_external]]
-        return cls(external, Exchange.of(numbers[external], owned, starts))
+        return cls(external, HaloExchange.of(numbers[external], owned, starts))
 
     @property
     def owned(self) -> Integers:
         """Local numbers of the process's own ones, in the order of its vectors."""
-        return np.asarray(self.kept[self.exchange.owned])
+        return np.asarray(self.local_numbers[self.exchange.owned])
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class InternalColumns:
     """Which columns of the elements of a block are internal unknowns, and which are not."""
 
     inner: Integers
     outer: Integers
 
     @classmethod
-    def of(cls, block: ElementBlock) -> Columns:
+    def of(cls, block: ElementBlock) -> InternalColumns:
         """Of any block."""
         unknowns = list(getattr(block.kernel, "unknowns", ()))
         inner = np.array([unknowns.index(name) for name in block.internal], dtype=np.int64)
@@ -69,7 +69,7 @@ class Columns:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class CondensedElements:
     """Elements whose internal unknowns are eliminated.
 
     numbers: (n, k) local numbers of these, and others: (n, e) of the others. within: K_II
@@ -83,7 +83,9 @@ class Piece:
     back: Array
 
     @classmethod
-    def of(cls, columns: Columns, dofs: Integers, K: Array, free: Flags) -> Piece:
+    def of(
+        cls, columns: InternalColumns, dofs: Integers, K: Array, free: Flags
+    ) -> CondensedElements:
         """Of tangents K (n, k + e, k + e)."""
         inner, outer = columns.inner, columns.outer
         others, rows = dofs[:, outer], K[:, inner]
@@ -98,7 +100,7 @@ class Piece:
         return inverses(self.within)
 
     @cached_property
-    def slopes(self) -> Array:
+    def coupling(self) -> Array:
         """K_II^-1 K_IE, (n, k, e): by how much the others move the internal unknowns."""
         return np.asarray(self.inverse @ self.out)
 
@@ -117,16 +119,16 @@ class Piece:
         inner, others = x[self.numbers], x[self.others]
         row = np.einsum("nie,ne->ni", of(self.out), others)
         np.add.at(y, self.numbers, row + np.einsum("nij,nj->ni", of(self.within), inner))
-        moved = inner + np.einsum("nie,ne->ni", of(self.slopes), others)
+        moved = inner + np.einsum("nie,ne->ni", of(self.coupling), others)
         np.add.at(y, self.others, np.einsum("nej,nj->ne", of(self.back), moved))
 
 
-def require_eliminated(pieces: list[Piece], exchange: Exchange) -> None:
+def require_eliminated(pieces: list[CondensedElements], exchange: HaloExchange) -> None:
     """Raise SingularMatrix on all processes where internal unknowns of any cannot be eliminated."""
     row = -1
     for piece in pieces:
         if not np.isfinite(piece.inverse).all():
-            row = int(exchange.numbers[piece.numbers[weakest(piece.within), 0]])
+            row = int(exchange.numbers[piece.numbers[most_singular(piece.within), 0]])
     row = int(max(world().allgather(row)))
     if row >= 0:
         raise SingularMatrix("internal unknowns of an element cannot be eliminated", row)

@@ -12,7 +12,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.discretisation.communicator import Share
+from softehl.runtime.discretisation.communicator import Communicator
 from softehl.runtime.equations.system import System
 from softehl.runtime.io import read_arrays, write_arrays
 
@@ -36,16 +36,16 @@ class TimeLevels:
         return self.times[0]
 
     def save(
-        self, path: Path, share: Share, requested_dt: float, digests: Mapping[str, Array]
+        self, path: Path, comm: Communicator, requested_dt: float, digests: Mapping[str, Array]
     ) -> None:
         """Write a checkpoint for any number of processes, atomically.
 
         requested_dt: length of step of the march. digests: of the study, see `digests_of`.
         """
-        state, states = share.whole_state(self.histories), share.whole(self.states)
+        state, states = comm.gather_state(self.histories), comm.gather(self.states)
         parts = {f"history {name}": values for name, values in state.items()}
         steps = {"dt": np.array(self.dt), "asked": np.array(requested_dt)}
-        if share.first:
+        if comm.is_root:
             arrays = {"times": np.array(self.times), "states": states, **steps, **parts}
             write_arrays(path, {**arrays, **digests})
 
@@ -62,9 +62,9 @@ class TimeLevels:
             if not np.array_equal(arrays.get(part, ()), digest):
                 raise StudyError(f"restart: {str(path)!r} is of another study: other {part}")
         histories = {n[8:]: v for n, v in arrays.items() if n.startswith("history ")}
-        states, times = system.share.own(arrays["states"]), tuple(arrays["times"].tolist())
+        states, times = system.comm.restrict(arrays["states"]), tuple(arrays["times"].tolist())
         dt = float(arrays["dt"]) if arrays["asked"] == requested_dt else requested_dt
-        return cls(times, states, system.share.own_state(histories), dt)
+        return cls(times, states, system.comm.restrict_state(histories), dt)
 
 
 def digests_of(system: System) -> dict[str, Array]:

@@ -100,12 +100,12 @@ class Result:
     @cached_property
     def x(self) -> Array:
         """All unknowns, (n,)."""
-        return read_only(self.system.share.whole(self.point.solution.x))
+        return read_only(self.system.comm.gather(self.point.solution.x))
 
     @property
     def state(self) -> dict[str, Array]:
         """History of the quadrature points, block -> (cells, points, k)."""
-        return self.system.share.whole_state(self.histories)
+        return self.system.comm.gather_state(self.histories)
 
     @property
     def iterations(self) -> int:
@@ -125,7 +125,7 @@ class Result:
         float
             The norm.
         """
-        return self.system.share.norm(self.x)
+        return self.system.comm.norm(self.x)
 
     def values(self, name: str) -> Array:
         """Return the values of an unknown.
@@ -185,7 +185,7 @@ class Result:
         if name not in self._whole.numbering.nodal:
             known = ", ".join(self._whole.numbering.nodal)
             raise UnknownNameError(f"no unknown {name!r} at nodes; there are {known}")
-        return self.system.share.at_all_nodes(self.values(name))
+        return self.system.comm.gather_nodes(self.values(name))
 
     def at(
         self, place: tuple[float, ...], *, cells: str | None = None, block: str | None = None
@@ -266,7 +266,7 @@ class Result:
             here = self._unknowns_at(places, group)
         else:
             here = between_nodes(self._whole, places, self.at_nodes(block), group)
-        rows = self.system.share.found_each(here)
+        rows = self.system.comm.first_not_none(here)
         for place, row in zip(places, rows, strict=True):
             if row is None:
                 where = "the mesh" if group is None else f"the cells {group!r}"
@@ -314,8 +314,8 @@ class Result:
             There is no such block; a KeyError.
         """
         self._block(block)
-        share = self.system.share
-        return {n: share.whole_cells(block, v) for n, v in self._own_fields(block).items()}
+        comm = self.system.comm
+        return {n: comm.gather_cells(block, v) for n, v in self._own_fields(block).items()}
 
     def _block(self, name: str) -> Block:
         """The block of a name, of all processes.  Raises KeyError that names what there is."""
@@ -361,7 +361,7 @@ class Result:
 
         def sums(weights: Array) -> Array:
             here = np.bincount(nodes.ravel(), weights.ravel(), points).astype(np.float64)
-            return self.system.share.total(here) if piece is None else piece.added(here)
+            return self.system.comm.sum(here) if piece is None else piece.added(here)
 
         count = sums(np.ones(nodes.shape))
         return {
@@ -379,7 +379,7 @@ class Result:
         holding = [b.name for b in assembler.blocks if isinstance(b.kernel, Spring | Tie)]
         others = {n: v for n, v in self.problem.parameters.items() if n not in holding}
         own = assembler.residual(x, others)
-        return self.system.share.whole_forces(own)
+        return self.system.comm.gather_forces(own)
 
     @property
     def _whole(self) -> System:
@@ -407,7 +407,7 @@ class Result:
         found = {}
         for name, numbers in self._whole.numbering.nodal.items():
             there = numbers[nodes]
-            found[name] = self.system.share.summed(self._forces, there[there >= 0])
+            found[name] = self.system.comm.sum_at(self._forces, there[there >= 0])
         return found
 
     @cached_property
@@ -554,24 +554,24 @@ class Result:
         Fields are named BLOCK.FIELD, at nodes as by `at_nodes` and in cells as means. Unknowns u_x,
         u_y, u_z are also written as a vector u. The file is complete at any moment.
         """
-        words, target, share = f"write({str(path)!r})", Path(path), self.system.share
+        words, target, share = f"write({str(path)!r})", Path(path), self.system.comm
         if target.suffix not in (".vtu", ".pvtu"):
             raise StudyError(f"{words}: results are written as .vtu or .pvtu")
         if target.suffix == ".vtu" and self.system.mesh.piece is not None:
             raise StudyError(f"{words}: of a mesh in parts results are .pvtu")
         writable(words, target)
         if target.suffix == ".pvtu":
-            pieces = piece_names(target, share.pieces[1])
+            pieces = piece_names(target, share.rank_and_size[1])
             piece = self._picture(self.system, self._own_cells(), self.point.solution.x).compact()
-            piece.write(target.with_name(pieces[share.pieces[0]]))
-            share.together()
-            if share.first:
+            piece.write(target.with_name(pieces[share.rank_and_size[0]]))
+            share.barrier()
+            if share.is_root:
                 piece.write_index(target, pieces)
         else:
             picture = self._picture(self._whole, self.system.mesh.cells, self.x)
-            if share.first:
+            if share.is_root:
                 picture.write(target)
-        share.together()
+        share.barrier()
 
     def _picture(self, system: System, cells: Mapping[str, Integers], x: Array) -> Picture:
         """Of all unknowns x, or of those of this process with its own fields."""
@@ -590,7 +590,7 @@ class Result:
         found = {}
         for kind, cells in mesh.cells.items():
             own = [b.nodes for b in self.system.blocks.values() if b.kind == kind]
-            if self.system.share.first:
+            if self.system.comm.is_root:
                 there = {tuple(row) for b in whole if b.kind == kind for row in b.nodes.tolist()}
                 own.append(cells[[tuple(row) not in there for row in cells.tolist()]])
             found[kind] = np.unique(np.concatenate([cells[:0], *own]), axis=0)

@@ -14,7 +14,7 @@ from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.sensitivity.element_derivatives import Elements
 from softehl.runtime.sensitivity.tape import Trail, WithoutMatrix
-from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.linear.linear_solver import Factorisation, Factors, SingularMatrix
 
 _EXACT, _ROUNDING = 1e-15, 1e-14
@@ -127,7 +127,7 @@ class Linear:
             if found is not None:
                 return found
             plain = _turned(memo.get("plain")) if turned else None
-            memo[key] = plain or choose("auto").factorise(K)
+            memo[key] = plain or direct_solver("auto").factorise(K)
         return np.asarray(memo[key].solve(b))
 
     def _iterated(self, b: Array, *, turned: bool) -> Array:

@@ -1,1 +1,1 @@
-"""Solvers: linear systems, Newton's method, continuation; they know no mesh."""
+"""Solvers, independent of meshes: linear systems, Newton's method, continuation, eigenvalues."""

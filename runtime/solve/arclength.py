@@ -116,7 +116,7 @@ class _SolutionCurve:
         return (forward - backward) / (2.0 * h)
 
     def linearise(self, y: Array) -> tuple[Array, SparseMatrix, Array]:
-        """R at y, dR/dx, and what R changes by per parameter, (n,), prescribed unknowns next_step.
+        """R at y, dR/dx, and dR/dparameter, (n,), with prescribed unknowns following.
 
         Prescribed unknowns u(parameter) are eliminated from dR/dx, so that the change of the other
         residuals has their share K u'.
@@ -366,13 +366,18 @@ class Arclength:
         return self._path(problem_at, None).response(np.append(x, start), self.newton.linear)
 
     def _path(self, problem_at: ProblemAt, derivative: Derivative | None) -> _SolutionCurve:
-        scales = self.x_scale, self.parameter_scale
-        return _SolutionCurve(problem_at, derivative, *scales, self.difference)
+        return _SolutionCurve(
+            problem_at=problem_at,
+            derivative=derivative,
+            x_scale=self.x_scale,
+            parameter_scale=self.parameter_scale,
+            difference=self.difference,
+        )
 
 
 @dataclass(eq=False)
 class _ArclengthStepper(Stepper):
-    """last: where it stands; extent: of the path so far."""
+    """Stepper by arc length. last: last accepted point; extent: of the path so far."""
 
     settings: Arclength
     path: _SolutionCurve
@@ -387,7 +392,7 @@ class _ArclengthStepper(Stepper):
     extent: _PathExtent | None = None
 
     def start(self) -> _ArclengthAttempt:
-        """Solve at the start and find the tangent on which the parameter changes as asked."""
+        """Solve at the start, and take the tangent in the direction of the parameter."""
         newton = self.settings.newton
         if self.initial_direction is not None:
             solution = Solution(self.x0, Status.CONVERGED, "", (), 0, 0)
@@ -455,7 +460,7 @@ class _ArclengthStepper(Stepper):
         return self._with_tangent(attempt, corrector.covector)
 
     def _with_tangent(self, attempt: _ArclengthAttempt, along: Array) -> _ArclengthAttempt:
-        """The trial with its tangent on the side of `along`; refused if there is none."""
+        """The attempt with its tangent on the side of `along`; refused if there is none."""
         if not attempt.converged:
             return attempt
         count = attempt.solution.factorisations + 1

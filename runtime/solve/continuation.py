@@ -248,7 +248,7 @@ class PathLog:
         self.failures.append(Point(parameter, solution.forget()))
 
     def branch(self, status: Status = Status.CONVERGED, message: str = "") -> Branch:
-        """The path as it ended; as it is so far, with this status, where it has no end yet."""
+        """The finished path; before its end, the path so far with this status."""
         status, message = self.end or (status, message)
         return Branch(
             points=tuple(self.points),
@@ -314,7 +314,7 @@ ProblemAt: TypeAlias = Callable[[float], NonlinearProblem]
 class StepAttempt:
     """An attempt at the next point of a path, over a step of length `step_length`.
 
-    next_step: length of the next step where the way knows it better than the step rule does.
+    next_step: length of the next step where the stepper overrides the step rule.
     """
 
     parameter: float

@@ -37,7 +37,7 @@ _RESIDUAL = 1e-6
 
 
 class NoModes(SoftehlError, ArithmeticError):  # noqa: N818 (named after what it is)
-    """There are no such eigenvalues; the message says why."""
+    """Error: the eigenvalues asked for do not exist; the message gives the reason."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ def terms(K: csc_array, shapes: Array) -> Array:
 
 
 def require_count(count: int, heavy: int) -> None:
-    """Raise NoModes where so many unknowns with mass have no so many modes."""
+    """Raise NoModes if more modes are asked for than unknowns have mass."""
     if heavy < 2:
         raise NoModes(f"{count} modes: of the unknowns that have a mass {heavy} can move")
     if not 0 < count < heavy:
@@ -159,7 +159,7 @@ def require_count(count: int, heavy: int) -> None:
 
 
 class Counted(Protocol):
-    """Factors that know how many eigenvalues are negative."""
+    """Factors with the number of negative eigenvalues."""
 
     @property
     def negative(self) -> int:

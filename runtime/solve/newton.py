@@ -26,7 +26,7 @@ _SUFFICIENT_DECREASE = 1e-4  # Armijo's constant on the norm, the customary valu
 
 
 class NonlinearProblem(Protocol):
-    """All that the solvers know of a problem: n equations R(x) = 0 in n unknowns."""
+    """Interface of a problem to the solvers: n equations R(x) = 0 in n unknowns."""
 
     def residual(self, x: Array) -> Array:
         """R(x), shape (n,)."""
@@ -73,7 +73,7 @@ class EvolvingProblem(NonlinearProblem, Protocol):
 
 @runtime_checkable
 class MeasuredProblem(NonlinearProblem, Protocol):
-    """A problem that measures its residuals by its own terms; Newton then asks it, not `norm`."""
+    """A problem with its own measure of residuals, which Newton uses instead of `norm`."""
 
     def measure(self, x: Array, K: SparseMatrix | None, *, rounded: bool = False) -> float:
         """Dimensionless size of R(x), (n,), inf if it is not finite.
@@ -86,7 +86,7 @@ class MeasuredProblem(NonlinearProblem, Protocol):
 
 @runtime_checkable
 class SearchedProblem(NonlinearProblem, Protocol):
-    """A problem with a number for line searches, which need one that is not bounded by 1."""
+    """A problem with a merit function for line searches, not bounded by 1."""
 
     def merit(self, x: Array) -> float:
         """Size of R(x), (n,), that falls along a good step."""
@@ -95,7 +95,7 @@ class SearchedProblem(NonlinearProblem, Protocol):
 
 @runtime_checkable
 class RoundedProblem(NonlinearProblem, Protocol):
-    """A problem that knows how well double precision can fulfil its equations."""
+    """A problem with a bound of what rounding contributes to its residual."""
 
     def beyond_rounding(self, r: Array, x: Array, K: SparseMatrix) -> float:
         """Norm of what is left of r = R(x), (n,), where the last digits of x are at fault for the
@@ -106,7 +106,7 @@ class RoundedProblem(NonlinearProblem, Protocol):
 
 @runtime_checkable
 class NamedProblem(NonlinearProblem, Protocol):
-    """A problem that knows names for messages."""
+    """A problem with names of unknowns and elements for messages."""
 
     def name_of(self, number: int) -> str:
         """Name of an unknown."""
@@ -318,7 +318,7 @@ class Newton:
         return state
 
     def _is_rounding(self, problem: NonlinearProblem, x: Array, K: SparseMatrix) -> bool:
-        """True if nothing is left of the residual at x but what rounding may have caused."""
+        """True if rounding may have caused all of the residual at x."""
         return isinstance(problem, MeasuredProblem) and (
             problem.measure(x, K, rounded=True) <= self.tolerance
         )

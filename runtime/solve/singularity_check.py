@@ -1,5 +1,5 @@
-"""Support of a solved problem: a body that floats solves equations that rounding alone keeps
-regular, and where it ends up is an accident.
+"""Check of the support of a solved body: rounding alone makes the matrix of a floating body
+regular, and the position of its solution is arbitrary.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _AT_REST = 1e-10  # of the largest entry of a vector
 
 @runtime_checkable
 class JudgesSingularity(Protocol):
-    """Factors whose matrix is not at hand as a whole, and which say by themselves what is loose."""
+    """Factors without an assembled matrix, which find unconstrained unknowns by themselves."""
 
     def unconstrained_unknown(self) -> int | None:
         """The number of the unknown that moves most where the matrix is singular, else None."""
@@ -56,7 +56,7 @@ class LastFactorisation:
 
 @dataclass
 class SupportCheck:
-    """Newton's method of a path whose first step that factorises is looked at once.
+    """Newton's method of a path that checks the support of the body after the first step.
 
     memory: its linear solver, which keeps the last factors.
     """
@@ -76,7 +76,7 @@ class SupportCheck:
         return self.memory.last
 
     def check(self, problem: NamedProblem, solution: Solution) -> None:
-        """Raise NotConverged if nothing held what was solved; ask after each converged step."""
+        """Raise NotConverged if the body is unconstrained; call after each converged step."""
         memory = self.memory.last
         if memory is None or self._checked:
             return

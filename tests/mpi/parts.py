@@ -90,16 +90,16 @@ def pulled(*, spread: bool) -> Study:
 
 def compared(parts: Result, whole: Result, block: str, side: str) -> dict[str, Any]:
     """Differences of what results have; nodes are matched by their places."""
-    mesh, share = whole.system.mesh, parts.system.share
+    mesh, share = whole.system.mesh, parts.system.comm
     mine = parts.system.mesh.points
-    places = np.stack([share.at_all_nodes(column) for column in mine.T], axis=1)
+    places = np.stack([share.gather_nodes(column) for column in mine.T], axis=1)
     here, there = (np.lexsort(np.round(x, 9).T) for x in (places, mesh.points))
     found = {"places": _apart(places[here], mesh.points[there])}
     for name in whole.system.numbering.nodal:
         found[name] = _apart(parts.gathered(name)[here], whole.values(name)[there])
     known = whole.system.blocks[block].kernel.fields
     for name, values in (whole.at_nodes(block) if known else {}).items():
-        shown = share.at_all_nodes(parts.at_nodes(block)[name])
+        shown = share.gather_nodes(parts.at_nodes(block)[name])
         found[f"{name} at nodes"] = _apart(shown[here], values[there])
     middle = tuple(mesh.points.mean(axis=0) + 0.01)
     found["at"] = _dicts(parts.at(middle), whole.at(middle))

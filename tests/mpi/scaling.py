@@ -18,8 +18,8 @@ from typing import Any, cast
 import numpy as np
 
 from softehl.runtime.mpi import world
-from softehl.runtime.parallel.distributed_problem import Team
-from softehl.runtime.parallel.mpi_communicator import Processes
+from softehl.runtime.parallel.distributed_problem import ParallelContext
+from softehl.runtime.parallel.mpi_communicator import MpiCommunicator
 from softehl.runtime.parallel.petsc import Petsc
 from tests.mpi.problems import cube
 
@@ -31,7 +31,7 @@ def measured(n: int) -> dict[str, Any]:
     ready = time.perf_counter()
     result = study.solve(steps=1, until=0.1, engine=engine)
     done, comm, times = time.perf_counter(), world(), engine.times
-    team = cast(Processes, result.system.share).team
+    team = cast(MpiCommunicator, result.system.comm).team
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20  # GB
     largest = {
         name: max(comm.allgather(value))
@@ -57,7 +57,7 @@ def measured(n: int) -> dict[str, Any]:
     }
 
 
-def _entries_sent(team: Team) -> int:
+def _entries_sent(team: ParallelContext) -> int:
     """Bytes of element entries whose row belongs to another process."""
     foreign = np.ones(len(team.part.unknowns), dtype=bool)
     foreign[team.part.owned] = False

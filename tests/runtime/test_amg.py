@@ -55,10 +55,10 @@ def iterations(study: softehl.Study, motions: int = 6) -> int:
     system = study.system()
     problem = system.problem(system.still(1.0, system.at_rest(), {}))
     r, K = problem.linearise(system.at_rest())
-    modes = linear_solver_choice.nodal_modes(system)
+    modes = linear_solver_choice.near_nullspace(system)
     assert modes is not None
-    told = amg.Modes(modes.order, 3, modes.near[:, :motions])
-    factors = amg.Multigrid(told).factorise(K)
+    told = amg.NearNullspace(modes.order, 3, modes.modes[:, :motions])
+    factors = amg.AlgebraicMultigrid(told).factorise(K)
     return factors._solved("cg", factors.grids.scale * -r[modes.order])[1]
 
 
@@ -105,9 +105,9 @@ def test_grids_serve_the_tangents_of_a_path(monkeypatch: pytest.MonkeyPatch) -> 
     system = cube().system()
     problem = system.problem(system.still(1.0, system.at_rest(), {}))
     r, K = problem.linearise(system.at_rest())
-    modes = linear_solver_choice.nodal_modes(system)
+    modes = linear_solver_choice.near_nullspace(system)
     assert modes is not None
-    solver, half = amg.Multigrid(modes), np.arange(len(r)) % 2
+    solver, half = amg.AlgebraicMultigrid(modes), np.arange(len(r)) % 2
     held = csc_array(K + diags_array(1e4 * half))
     for matrix in (K, held, K):
         x = solver.factorise(matrix).solve(r)
@@ -130,7 +130,11 @@ def test_factors_stand_in_where_multigrid_fails(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(linear_solver_choice.FACTORS_UP_TO, 3, 100)
-    monkeypatch.setattr(linear_solver_choice, "Multigrid", partial(amg.Multigrid, most=3))
+    monkeypatch.setattr(
+        linear_solver_choice,
+        "AlgebraicMultigrid",
+        partial(amg.AlgebraicMultigrid, max_iterations=3),
+    )
     study, reference = cube(), cube().solve(linear="direct")
     found = study.solve(progress=True)
     assert "superlu after multigrid failed, because of 1029" in capsys.readouterr().err

@@ -83,14 +83,14 @@ def test_an_order_serves_all_matrices_of_a_pattern(rng: np.random.Generator) -> 
     for A in (first, second, first):
         x = solver.factorise(A).solve(b)
         assert A @ x == pytest.approx(b, abs=1e-10)
-        assert len(solver.orders.known) == 1
+        assert len(solver.orders.orders) == 1
         assert SuperLU().factorise(A).solve(b) == pytest.approx(x, rel=1e-9)
     for A in (first, second):
         solver.condense(A, BOUNDARY)
-        assert len(solver.orders.known) == 2
+        assert len(solver.orders.orders) == 2
     for k in range(10):
         solver.condense(first, BOUNDARY[k % 4 :])
-        assert len(solver.orders.known) <= solver.orders.most
+        assert len(solver.orders.orders) <= solver.orders.max_orders
 
 
 def test_what_is_too_large_goes_by_solves(

@@ -14,7 +14,7 @@ from softehl import Mesh, Study, load_kernel
 from softehl.runtime.arrays import Array
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
-from softehl.runtime.solve.linear.static_condensation import Condensing
+from softehl.runtime.solve.linear.static_condensation import CondensingSolver
 from softehl.runtime.solve.linear.superlu import SuperLU
 
 MODELS = Path(__file__).parents[2] / "docs" / "models"
@@ -138,7 +138,7 @@ def test_a_condensed_step_is_that_of_the_whole_matrix() -> None:
     for k, one in enumerate(groups):
         for other in np.delete(groups, k, axis=0):
             K[np.ix_(one, other)] = 0.0
-    factors = Condensing(SuperLU(), (groups,)).factorise(csc_array(K))
+    factors = CondensingSolver(SuperLU(), (groups,)).factorise(csc_array(K))
     b = random.uniform(-1, 1, 9)
     np.testing.assert_allclose(factors.solve(b), np.linalg.solve(K, b), rtol=1e-12)
     inner, others = groups.ravel(), factors.external
@@ -150,7 +150,7 @@ def test_a_condensed_step_is_that_of_the_whole_matrix() -> None:
     assert factors.sign() == np.sign(np.linalg.det(K))
     K[2, 2] = K[2, 7] = K[7, 2] = 0.0
     with pytest.raises(SingularMatrix, match="internal unknowns of element 1") as raised:
-        Condensing(SuperLU(), (groups,)).factorise(csc_array(K))
+        CondensingSolver(SuperLU(), (groups,)).factorise(csc_array(K))
     assert raised.value.row == 2
 
 

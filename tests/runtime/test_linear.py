@@ -102,7 +102,7 @@ def test_factors_do_not_depend_on_what_was_factorised_before() -> None:
     for K in (grid(20), 2.0 * grid(20), grid(20)):
         now = used.factorise(csc_array(K)).solve(b)
         assert np.array_equal(now, SuperLU().factorise(csc_array(K)).solve(b))
-    assert len(used.orders.known) == 1
+    assert len(used.orders.orders) == 1
 
 
 def test_default_ordering_makes_less_fill_than_colamd_and_solves_as_well() -> None:

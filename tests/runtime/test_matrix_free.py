@@ -17,9 +17,9 @@ from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.parallel.matrix_free import MatrixFree
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity import linearised_step
-from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.linear.krylov import conjugate_gradients, minimal_residuals
-from softehl.runtime.solve.linear.multigrid import Level, Multigrid
+from softehl.runtime.solve.linear.multigrid import MultigridCycle, MultigridLevel
 from softehl.runtime.solve.solution import NotConverged
 
 
@@ -172,7 +172,7 @@ def laplacian(n: int) -> csr_array:
     return csr_array(scale @ A @ scale)
 
 
-def cycle_of(A: csr_array) -> Multigrid:
+def cycle_of(A: csr_array) -> MultigridCycle:
     """Two levels with linear interpolation."""
     n = A.shape[0]
     P = np.zeros((n, n // 2))
@@ -180,8 +180,8 @@ def cycle_of(A: csr_array) -> Multigrid:
         P[2 * k + 1, k] = 1.0
         P[[2 * k, min(2 * k + 2, n - 1)], k] = 0.5
     lower = np.linalg.inv(P.T @ A.toarray() @ P)
-    level = Level.of(A.__matmul__, A.diagonal(), csr_array(P))
-    return Multigrid([level], lower.__matmul__)
+    level = MultigridLevel.of(A.__matmul__, A.diagonal(), csr_array(P))
+    return MultigridCycle([level], lower.__matmul__)
 
 
 def test_a_cycle_is_symmetric_and_positive(rng: np.random.Generator) -> None:
@@ -230,13 +230,13 @@ def test_derivatives_need_no_factors(monkeypatch: pytest.MonkeyPatch) -> None:
 
     by = {"body": ["mu", "lam"], "load:top": ["u_x"], "fix:top": ["u_z"], "nodes": ["x"]}
     wanted, whole = pushed().solve(), pushed().solve().derivative(by={"body": ["mu"]})
-    monkeypatch.setattr(linearised_step, "choose", None)
+    monkeypatch.setattr(linearised_step, "direct_solver", None)
     found = pushed().solve(linear="matrix-free")
     asked: tuple[dict[str, Any], ...] = ({"at": (1, 1, 0.5)}, {"reaction": "bottom"})
     for where in asked:
         slopes = found.sensitivity("u_x", by=by, **where)
         with monkeypatch.context() as with_factors:
-            with_factors.setattr(linearised_step, "choose", choose)
+            with_factors.setattr(linearised_step, "direct_solver", direct_solver)
             expected = wanted.sensitivity("u_x", by=by, **where)
         for key, slope in expected.items():
             np.testing.assert_allclose(slopes[key], slope, rtol=1e-8, atol=1e-10)

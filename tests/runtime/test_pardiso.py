@@ -12,7 +12,7 @@ from scipy.sparse import csc_array, random_array
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import pardiso
-from softehl.runtime.solve.linear.direct import MissingBackend, choose
+from softehl.runtime.solve.linear.direct import MissingBackend, direct_solver
 from softehl.runtime.solve.linear.linear_solver import Factorisation, LinearSolver, SingularMatrix
 from softehl.runtime.solve.linear.pardiso import Idle, Pardiso
 from softehl.runtime.solve.linear.superlu import SuperLU
@@ -31,15 +31,15 @@ def kind(factors: Factorisation) -> int:
 
 def test_auto_is_superlu_where_pardiso_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pardiso, "available", lambda: False)
-    assert choose("auto") == choose("superlu") == SuperLU()
+    assert direct_solver("auto") == direct_solver("superlu") == SuperLU()
     with pytest.raises(MissingBackend, match=r'allowed here: "auto" or "superlu"'):
-        choose("pardiso")
+        direct_solver("pardiso")
 
 
 @installed
 def test_auto_is_pardiso_where_it_is_installed() -> None:
-    assert choose("auto").name == choose("pardiso").name == "pardiso"
-    assert choose("superlu").name == "superlu"
+    assert direct_solver("auto").name == direct_solver("pardiso").name == "pardiso"
+    assert direct_solver("superlu").name == "superlu"
 
 
 @installed

@@ -15,7 +15,13 @@ from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.equations.system import System
 from softehl.runtime.mpi import MissingPetsc
 from softehl.runtime.parallel.engine import engine_of
-from softehl.runtime.parallel.partitioning import Cells, Part, Partition, part_of, partition
+from softehl.runtime.parallel.partitioning import (
+    CellGraph,
+    LocalSystem,
+    Partition,
+    part_of,
+    partition,
+)
 from tests.runtime import solid_page as pages
 
 PROCESSES = 3
@@ -37,11 +43,11 @@ def sheared() -> System:
 
 def cut(system: System, rng: np.random.Generator) -> Partition:
     """Cells dealt to the processes as by dice, the worst partition there is."""
-    cells = Cells.of(system)
+    cells = CellGraph.of(system)
     return partition(system, cells, rng.integers(0, PROCESSES, cells.count), PROCESSES)
 
 
-def parts(system: System, found: Partition) -> list[Part]:
+def parts(system: System, found: Partition) -> list[LocalSystem]:
     return [part_of(system, found, process) for process in range(PROCESSES)]
 
 
@@ -84,7 +90,7 @@ def test_displacements_stand_node_by_node_where_there_is_nothing_else() -> None:
     study = Study(Mesh.rectangle(1.0, 1.0, cells=(3, 3)))
     study.add("body", pages.solid(), mu=0.4, lame=1.5, thickness=1.0)
     system = study.system()
-    found = partition(system, Cells.of(system), np.zeros(9, dtype=np.int64), 1)
+    found = partition(system, CellGraph.of(system), np.zeros(9, dtype=np.int64), 1)
     assert found.interleaved == 2
     nodal = system.numbering.nodal
     assert (found.numbers[nodal["u_y"]] == found.numbers[nodal["u_x"]] + 1).all()
@@ -109,7 +115,7 @@ def test_prescribed_values_are_those_of_the_whole(rng: np.random.Generator) -> N
 def test_neighbours_have_a_face_in_common() -> None:
     study = Study(Mesh.rectangle(1.0, 1.0, cells=(3, 3)))
     study.add("body", pages.solid(), mu=0.4, lame=1.5, thickness=1.0)
-    graph = Cells.of(study.system()).neighbours(slice(4, 5), 2)
+    graph = CellGraph.of(study.system()).neighbours(slice(4, 5), 2)
     assert sorted(graph.indices.tolist()) == [1, 3, 4, 5, 7]
 
 

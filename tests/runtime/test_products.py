@@ -14,7 +14,11 @@ from softehl.codegen.language.weak_form import Page
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.element_blocks import ElementBlock
-from softehl.runtime.discretisation.matrix_free_products import NoProductError, Places, Product
+from softehl.runtime.discretisation.matrix_free_products import (
+    ElementNumbering,
+    ElementProduct,
+    NoProductError,
+)
 from softehl.runtime.mesh.cells import CELLS
 from tests.codegen import field_pages
 
@@ -82,15 +86,15 @@ def test_products_are_those_of_assembled_tangents(
     block = assembler.block("b")
     size = np.abs(wanted).max()
     for count in (1, 2):
-        places = Places.of(block, count)
+        places = ElementNumbering.of(block, count)
         assert count == 1 or kind.startswith("hex") or all(a < b for a, b in places.runs)
         found = np.zeros(len(x))
-        product = Product.of(block, x, parameters, places)
+        product = ElementProduct.of(block, x, parameters, places)
         assert product.kept.ctypes.data % 64 == 0, "vectors of lanes lie in two lines of the cache"
         product.add(v, found)
         assert np.abs(found - wanted).max() < 1e-12 * size
     other = np.zeros(len(x))
-    Product.of(block, 1.1 * x, parameters, places).add(v, other)
+    ElementProduct.of(block, 1.1 * x, parameters, places).add(v, other)
     assert np.abs(other - wanted).max() > 1e-9 * size, "the state does not matter"
 
 
@@ -100,7 +104,9 @@ def test_a_failed_local_iteration_spoils_the_product(rng: np.random.Generator) -
     assert block.point_data is not None
     block.point_data[3] = np.nan
     found = np.zeros(len(x))
-    Product.of(block, x, parameters, Places.of(block, 1)).add(np.ones(len(x)), found)
+    ElementProduct.of(block, x, parameters, ElementNumbering.of(block, 1)).add(
+        np.ones(len(x)), found
+    )
     assert np.isnan(found[block.dofs[3]]).all()
     assert np.isfinite(found).any()
 
@@ -109,4 +115,4 @@ def test_what_has_no_product_is_refused(rng: np.random.Generator) -> None:
     for page, kind in ((field_pages.rubber, "quad9"), (field_pages.mixed, "quad9")):
         block = assembled(page, kind, rng)[0].block("b")
         with pytest.raises(NoProductError, match=r"says m\.offer\(product=True\)"):
-            Places.of(block, 1)
+            ElementNumbering.of(block, 1)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from softehl import Mesh, Study
-from softehl.runtime.contact.search import TouchingProblem
+from softehl.runtime.contact.search import ContactProblem
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.results.result import Result
@@ -104,7 +104,7 @@ def test_the_tangent_is_the_derivative(orders: tuple[int, int], geometry: str) -
     difference = (4 * half - whole) / 3
     size = np.abs(difference).max()
     assert np.abs(K @ y - difference).max() < 1e-8 * size
-    assert isinstance(problem, TouchingProblem)
+    assert isinstance(problem, ContactProblem)
     frozen = replace(problem, contacts=(), latest=[])  # a tangent without contact is seen
     assert np.abs(frozen.linearise(x)[1] @ y - difference).max() > 1e-2 * size
 

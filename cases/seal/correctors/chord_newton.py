@@ -26,7 +26,7 @@ from scipy.linalg import lapack
 
 from softehl.cases.seal.correctors.layer_split import Parts
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.solve.linear.linear_solver import Condensed, SingularMatrix, SparseMatrix
+from softehl.runtime.solve.linear.linear_solver import SchurComplement, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.newton import NonlinearProblem
 from softehl.runtime.solve.solution import Solution, Status
 
@@ -213,12 +213,12 @@ class ModifiedNewton:
     window: int = 3
     depth: int = 4
 
-    def solve(self, problem: LayeredProblem, condensed: Condensed, x0: Array) -> Solution:
+    def solve(self, problem: LayeredProblem, condensed: SchurComplement, x0: Array) -> Solution:
         """Solve R(x) = 0 from x0, (n,), with the body's condensation at a state near by."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return self._solve(problem, condensed, problem.admissible(x0))
 
-    def _solve(self, problem: LayeredProblem, condensed: Condensed, x: Array) -> Solution:
+    def _solve(self, problem: LayeredProblem, condensed: SchurComplement, x: Array) -> Solution:
         history = AndersonMixing(problem, self.depth)
         history.add(x, problem.residual(x))
         norms = [residual_size(problem, history.latest.r)]
@@ -263,7 +263,7 @@ class ModifiedNewton:
         return None
 
     def _outer(
-        self, problem: LayeredProblem, condensed: Condensed, at: Iterate, target: float
+        self, problem: LayeredProblem, condensed: SchurComplement, at: Iterate, target: float
     ) -> Array | None:
         """The next iterate, None if the inner iteration fails."""
         g, reduced = condensed.reduce(at.body)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from softehl.cases.seal.correctors.chord_newton import LayeredProblem, ModifiedNewton
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear.linear_solver import Condensed, Condenser, SingularMatrix
+from softehl.runtime.solve.linear.linear_solver import Condenser, SchurComplement, SingularMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution, Status
 
@@ -24,7 +24,7 @@ class StaleTangent:
     unreported: condensations that no solution has counted yet.
     """
 
-    condensed: Condensed | None = None
+    condensed: SchurComplement | None = None
     state: Array | None = None
     accepted: Array | None = None
     outdated: bool = False

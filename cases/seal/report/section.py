@@ -22,7 +22,7 @@ from softehl.cases.seal.states.observer_adapter import read_profile, read_sectio
 from softehl.cases.seal.states.state import FilmRow, Profile, Section
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.postprocessing import von_mises
-from softehl.runtime.mesh.face_matching import once
+from softehl.runtime.mesh.face_matching import unrepeated_faces
 
 _METAL, _FLUID, _FILM, _CONTACT, _LINE = "#d9dadd", "#d3e6f5", "#1b6ca8", "#8a8f98", "#3b3f45"
 _STRESSES = tuple(f"sigma_{name}" for name in ("zz", "rr", "tt", "zr"))
@@ -55,7 +55,9 @@ def nodal_von_mises(section: Section) -> Array:
 
 def boundary_edges(cells: Integers) -> Integers:
     """Edges (b, 2) that only one of the cells (m, 4) has, in the sense of the cells."""
-    return once(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), corners=2)
+    return unrepeated_faces(
+        np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), corners=2
+    )
 
 
 @dataclass(frozen=True, eq=False)

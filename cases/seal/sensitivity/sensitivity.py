@@ -30,7 +30,7 @@ from softehl.cases.seal.sensitivity.quantities import (
 from softehl.cases.seal.solve.driver import Differentiate
 from softehl.cases.seal.solve.film_solver import Film
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.linear.linear_solver import LinearSolver, SingularMatrix, SparseMatrix
 
 
@@ -112,7 +112,7 @@ def differentiation(p: Numerics) -> Differentiate | None:
     """
     if not p.sensitivity:
         return None
-    linear, known, last = choose(p.linear), dict[str, Inputs](), None
+    linear, known, last = direct_solver(p.linear), dict[str, Inputs](), None
 
     def differentiate(film: Film) -> Mapping[str, Mapping[str, float]] | None:
         nonlocal known, last

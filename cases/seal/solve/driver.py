@@ -42,7 +42,7 @@ from softehl.cases.seal.states.verdict import (
     fewest_inlet_segments,
 )
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Status
 
@@ -115,7 +115,7 @@ class DryContact:
     @classmethod
     def of(cls, p: Seal, observer: Observer, contacts: Path | None = None) -> DryContact:
         """The dry contact of a case; contacts: see `run`.  Raises StageError."""
-        driver = PathDriver(observer, Newton(max_iterations=10, linear=choose(p.linear)))
+        driver = PathDriver(observer, Newton(max_iterations=10, linear=direct_solver(p.linear)))
         solver = ContactSolver(driver)
         return cls(*ContactMeshes(solver, ContactStore(contacts)).contact(p), solver)
 
@@ -201,6 +201,10 @@ def _outcome(
         unknowns=system.counts,
         kernel_signatures={b.kernel.name: b.kernel.signature for b in blocks},
         stages=tuple(records),
-        solvers={"solver": p.solver, "linear": choose(p.linear).name, "assembly": assembly(p)},
+        solvers={
+            "solver": p.solver,
+            "linear": direct_solver(p.linear).name,
+            "assembly": assembly(p),
+        },
         numbers=numbers or {},
     )

@@ -19,7 +19,7 @@ from softehl.errors import SoftehlError
 from softehl.log import warn
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.face_matching import firsts, matched, once
+from softehl.runtime.mesh.face_matching import first_occurrences, match_faces, unrepeated_faces
 from softehl.runtime.mesh.readers.file_content import Content
 
 _GENERATORS = {
@@ -567,7 +567,12 @@ class _Mesh:
                 for face, local in CELLS[cell].side_nodes:
                     lists.setdefault(face.name, []).append(np.array(rows)[:, list(local)])
             self.free = {
-                k: set(map(tuple, np.sort(once(np.concatenate(v), CELLS[k].corners), 1).tolist()))
+                k: set(
+                    map(
+                        tuple,
+                        np.sort(unrepeated_faces(np.concatenate(v), CELLS[k].corners), 1).tolist(),
+                    )
+                )
                 for k, v in lists.items()
             }
         return self.free[kind]
@@ -628,7 +633,7 @@ def read(path: Path) -> Content:
         for surface in scope.surfaces.values():
             if not surface.internal:
                 side = {k: np.array(v) for k, v in mesh.side(key, surface).items()}
-                side = {k: v[np.sort(firsts(v)[0])] for k, v in side.items()}
+                side = {k: v[np.sort(first_occurrences(v)[0])] for k, v in side.items()}
                 surfaces.add(surface.name, scope.name, side)
     sides = surfaces.named()
     for names, ending in ((faces, ".elements"), (nodes, ".nodes")):
@@ -747,12 +752,12 @@ def _labels(
             family = next(f for f, pattern, _ in _FAMILIES if re.match(pattern, types[cell]))
             for number, (face, local) in enumerate(CELLS[cell].side_nodes, start=1):
                 if face.name == kind:
-                    row = matched(nodes[left], rows[:, list(local)], face.corners)
+                    row = match_faces(nodes[left], rows[:, list(local)], face.corners)
                     label = f"{'E' if family == 'shell' else 'S'}{number}"
                     lines += [f"{first[cell] + k}, {label}" for k in row[row >= 0].tolist()]
                     left = left[row < 0]
             if cell == kind and family == "shell":
-                row = matched(nodes[left], rows, CELLS[cell].corners)
+                row = match_faces(nodes[left], rows, CELLS[cell].corners)
                 for k, face_nodes in zip(row[row >= 0], nodes[left[row >= 0]], strict=True):
                     upper = _runs_along(face_nodes, rows[k], CELLS[kind].corners)
                     lines.append(f"{first[cell] + int(k)}, {'SPOS' if upper else 'SNEG'}")

@@ -15,7 +15,7 @@ import numpy as np
 from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.face_matching import firsts
+from softehl.runtime.mesh.face_matching import first_occurrences
 from softehl.runtime.mesh.readers.file_content import Content
 
 _KINDS = {cell.gmsh: name for name, cell in CELLS.items() if cell.gmsh}
@@ -268,7 +268,7 @@ def _content(found: _Parts) -> Content:
         rows = index_of_tag[np.concatenate(parts)]
         if rows.min() < 0:
             raise GmshError(f"a {kind} has a node that is not in the file")
-        first, number = firsts(rows)
+        first, number = first_occurrences(rows)
         cells[kind] = rows[first][:, list(CELLS[kind].gmsh_nodes or range(rows.shape[1]))]
         bounds = np.cumsum([len(part) for part in parts])[:-1]
         members: dict[str, list[Integers]] = {}

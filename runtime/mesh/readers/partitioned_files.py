@@ -15,9 +15,9 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.face_matching import firsts, matched
+from softehl.runtime.mesh.face_matching import first_occurrences, match_faces
 from softehl.runtime.mesh.mesh import Mesh, MeshError
-from softehl.runtime.mesh.partitioning import joined
+from softehl.runtime.mesh.partitioning import join_partitions
 from softehl.runtime.mesh.readers.meshio import content_of, highest, mesh_of
 from softehl.runtime.mpi import world
 
@@ -43,7 +43,7 @@ def read_parts(path: Path) -> Mesh:
     flat = Mesh(
         np.ascontiguousarray(mesh.points[:, :dimension]), mesh.cells, mesh.groups, mesh.sides
     )
-    return flat if comm.size == 1 else joined(flat, numbers)
+    return flat if comm.size == 1 else join_partitions(flat, numbers)
 
 
 def _file(path: Path, number: int) -> Path:
@@ -110,7 +110,7 @@ def _long(lists: Mapping[str, list[Integers]]) -> dict[str, Integers]:
 
 def _once(faces: Integers) -> Integers:
     """Faces that stand in the files of two parts, once."""
-    return faces[firsts(faces)[0]]
+    return faces[first_occurrences(faces)[0]]
 
 
 def write_parts(mesh: Mesh, path: Path, count: int) -> None:
@@ -185,7 +185,7 @@ class _Chosen:
             for kind, side_faces in side.items():
                 if kind in faces:
                     cell_faces = np.concatenate(faces[kind])
-                    belongs = matched(side_faces, cell_faces, CELLS[kind].corners) >= 0
+                    belongs = match_faces(side_faces, cell_faces, CELLS[kind].corners) >= 0
                 else:  # points or edges: in the first part that has them
                     belongs = np.asarray((self.place[side_faces] >= 0).all(axis=1))
                 result[f"side:{kind}:{name}"] = self.place[side_faces[belongs]]

@@ -23,19 +23,19 @@ _UNSYMMETRIC = 1e-9  # of the largest entry
 
 
 @dataclass(frozen=True, eq=False)
-class Entries:
-    """Numbers of the entries of a matrix whose unknowns are in another order.
+class PermutedEntries:
+    """Positions of the entries of a matrix in a permuted one.
 
-    indices, indptr: of the matrix, by columns. place: numbers of its entries, (n, n), by blocks of
+    indices, indptr: of the matrix, by columns. positions: of its entries, (n, n), by blocks of
     rows, in the order; -1 where a block has more than the matrix.
     """
 
     indices: Any
     indptr: Any
-    place: bsr_array
+    positions: bsr_array
 
     @classmethod
-    def of(cls, K: SparseMatrix, order: Integers, block: int = 1) -> Entries:
+    def of(cls, K: SparseMatrix, order: Integers, block: int = 1) -> PermutedEntries:
         """Of the pattern of K, (n, n), with blocks of so many rows and columns."""
         numbers = csr_array((np.arange(1, K.nnz + 1), K.indices, K.indptr), shape=K.shape)
         positions = csr_array(numbers[order][:, order].T)  # of columns that are taken for rows
@@ -48,9 +48,9 @@ class Entries:
         """True if K has the pattern."""
         return np.array_equal(K.indptr, self.indptr) and np.array_equal(K.indices, self.indices)
 
-    def taken(self, K: SparseMatrix) -> tuple[Any, bool]:
+    def permuted(self, K: SparseMatrix) -> tuple[Any, bool]:
         """K in the order, by blocks, and whether it is symmetric."""
-        positions = self.place
+        positions = self.positions
         data = np.append(K.data, 0.0)[positions.data]
         permuted = bsr_array((data, positions.indices, positions.indptr), shape=positions.shape)
         u, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, positions.shape[0]))
@@ -60,8 +60,8 @@ class Entries:
         )
 
 
-_WORN, _SLACK = 1.5, 4
-"""Grids are made anew where a solution takes so many times the iterations of the first, and these:
+_STALE_RATIO, _STALE_OFFSET = 1.5, 4
+"""The hierarchy is rebuilt if iterations exceed so many times those of the first solve, plus these:
 a hierarchy takes about as long as twelve of them."""
 _ROUNDING = 1e-10  # of the largest eigenvalue of the coarsest grid
 _COARSEST = 100  # unknowns that are solved by a pseudo-inverse, in milliseconds
@@ -82,35 +82,35 @@ def available() -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
-    """Motions that cost no energy where nothing is prescribed: multigrid must keep them.
+class NearNullspace:
+    """Near null space: modes without energy where nothing is prescribed, which multigrid must keep.
 
-    order: (n,) unknowns node by node, `block` at each. near: (n, k) the motions, in that order.
+    order: (n,) unknowns node by node, `block` at each. modes: (n, k) the motions, in that order.
     """
 
     order: Integers
     block: int
-    near: Array
+    modes: Array
 
 
 @dataclass(eq=False)
-class Multigrid:
+class AlgebraicMultigrid:
     """Smoothed aggregation around conjugate gradients; GMRES where a matrix is not symmetric.
 
     Rows and columns are scaled to a diagonal of 1: polynomials smooth stiff and soft parts alike.
     The grids of a symmetric matrix serve the next ones, too, until these take many more iterations.
     tolerance: of the residual, relative to the right side; Newton's method corrects the rest.
-    most: iterations of one solution.
+    max_iterations: iterations of one solution.
     """
 
-    modes: Modes
+    modes: NearNullspace
     tolerance: float = 1e-6
-    most: int = 150
+    max_iterations: int = 150
     name: str = "multigrid"
-    _grids: Grids | None = field(default=None, init=False, repr=False)
-    _entries: Entries | None = field(default=None, init=False, repr=False)
+    _grids: GridHierarchy | None = field(default=None, init=False, repr=False)
+    _entries: PermutedEntries | None = field(default=None, init=False, repr=False)
 
-    def factorise(self, K: SparseMatrix) -> Preconditioned:
+    def factorise(self, K: SparseMatrix) -> AmgFactors:
         """The hierarchy of K, (n, n); raises SingularMatrix."""
         from pyamg.util.utils import scale_columns, scale_rows
 
@@ -123,70 +123,73 @@ class Multigrid:
             )
         prescribed = (sums == diagonal)[order]  # prescribed: nothing else in the row
         if self._entries is None or not self._entries.fit(K):
-            self._entries = Entries.of(K, order, self.modes.block)
-        A, symmetric = self._entries.taken(K)
+            self._entries = PermutedEntries.of(K, order, self.modes.block)
+        A, symmetric = self._entries.permuted(K)
         grids = self._grids
-        if grids is None or not (symmetric and grids.serve(prescribed)):
+        if grids is None or not (symmetric and grids.fits(prescribed)):
             diagonal = diagonal[order]
             scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-            nullspace = np.where(prescribed[:, None], 0.0, self.modes.near / scale[:, None])
+            nullspace = np.where(prescribed[:, None], 0.0, self.modes.modes / scale[:, None])
             smoother = CHEBYSHEV if symmetric else GAUSS_SEIDEL
-            grids = Grids(scale, nullspace, prescribed, self.modes.block, smoother)
+            grids = GridHierarchy(scale, nullspace, prescribed, self.modes.block, smoother)
             self._grids = grids if symmetric else None
         for scaled in (scale_rows, scale_columns):
             scaled(A, grids.scale, copy=False)
-        return Preconditioned(A, grids, order, symmetric, self.tolerance, self.most)
+        return AmgFactors(A, grids, order, symmetric, self.tolerance, self.max_iterations)
 
 
 @dataclass(eq=False)
-class Grids:
-    """A hierarchy of grids for like matrices, made of the first of them.
+class GridHierarchy:
+    """A hierarchy of grids for similar matrices, built from the first of them.
 
-    scale: (n,) of rows and columns. near: (n, k) motions that they hardly resist. held: (n,)
-    prescribed unknowns. block: unknowns of a node, which are neighbours.
+    scale: (n,) of rows and columns. nullspace: (n, k) near null space. prescribed: (n,) unknowns.
+    block: unknowns of a node, which are neighbours.
     """
 
     scale: Array
-    near: Array
-    held: Flags
+    nullspace: Array
+    prescribed: Flags
     block: int
     smoother: Smoother
-    worn: bool = field(default=False, init=False)
+    stale: bool = field(default=False, init=False)
     _levels: Any = field(default=None, init=False)
     _of: Any = field(default=None, init=False)
-    _least: int = field(default=0, init=False)
+    _first_iterations: int = field(default=0, init=False)
 
-    def serve(self, held: Flags) -> bool:
+    def fits(self, held: Flags) -> bool:
         """True if a matrix with these unknowns prescribed may use them."""
-        return not self.worn and np.array_equal(held, self.held)
+        return not self.stale and np.array_equal(held, self.prescribed)
 
     def of(self, A: Any) -> Any:
         """The hierarchy, made of A if there is none."""
-        return self.renewed(A) if self._levels is None else self._levels
+        return self.rebuild(A) if self._levels is None else self._levels
 
-    def renewed(self, A: Any) -> Any:
+    def rebuild(self, A: Any) -> Any:
         """The hierarchy of A itself."""
         self._levels = None  # never two at a time: they are what memory goes into
-        self._levels, self._least = hierarchy(A, self.near, self.block, self.smoother), 0
-        self._of, self.worn = A, False
+        self._levels, self._first_iterations = (
+            hierarchy(A, self.nullspace, self.block, self.smoother),
+            0,
+        )
+        self._of, self.stale = A, False
         return self._levels
 
-    def own(self, A: Any) -> bool:
-        """True if they were made of A."""
+    def is_made_of(self, A: Any) -> bool:
+        """True if the hierarchy was built from A."""
         return self._of is A
 
-    def took(self, steps: int) -> None:
+    def note_iterations(self, steps: int) -> None:
         """Learn how many iterations a solution took."""
-        self._least = self._least or steps
-        self.worn = self.worn or steps > _WORN * self._least + _SLACK
+        self._first_iterations = self._first_iterations or steps
+        self.stale = self.stale or steps > _STALE_RATIO * self._first_iterations + _STALE_OFFSET
 
 
 def hierarchy(
-    A: Any, near: Array, block: int, smoother: Smoother = GAUSS_SEIDEL, *, light: bool = False
+    A: Any, nullspace: Array, block: int, smoother: Smoother = GAUSS_SEIDEL, *, light: bool = False
 ) -> Any:
     """Smoothed aggregation of A, (n, n), sparse, as pyamg has it: a symmetric cycle.
 
-    near: (n, k) motions that A hardly resists. block: unknowns of a node, which are neighbours.
+    nullspace: (n, k) near null space. block: unknowns of a node, which are neighbours.
     light: half the sweeps of Gauss and Seidel, and an interpolation that costs more to make.
     """
     import pyamg
@@ -195,7 +198,7 @@ def hierarchy(
     with np.errstate(all="ignore"):
         return pyamg.smoothed_aggregation_solver(
             A.tobsr((block, block)),
-            B=near,
+            B=nullspace,
             strength=("symmetric", {"theta": 0.0}),
             smooth=("energy", {"krylov": "cg"}) if light else "jacobi",
             improve_candidates=None,
@@ -206,15 +209,15 @@ def hierarchy(
 
 
 @dataclass(frozen=True, eq=False)
-class Preconditioned:
+class AmgFactors:
     """A scaled matrix and a hierarchy of grids for it, as `Factors`."""
 
     matrix: Any
-    grids: Grids
+    grids: GridHierarchy
     order: Integers
     symmetric: bool
     tolerance: float
-    most: int
+    max_iterations: int
 
     def solve(self, b: Array) -> Array:
         """x of the matrix, (n,), to the tolerance; raises SingularMatrix where it is not met."""
@@ -222,25 +225,25 @@ class Preconditioned:
             return np.zeros(len(b))
         right = self.grids.scale * b[self.order]
         scaled, residual = self._cycles("cg", right) if self.symmetric else (right, np.inf)
-        if not residual <= 10.0 * self.tolerance and not self.grids.own(self.matrix):
-            self.grids.renewed(self.matrix)
+        if not residual <= 10.0 * self.tolerance and not self.grids.is_made_of(self.matrix):
+            self.grids.rebuild(self.matrix)
             scaled, residual = self._cycles("cg", right)
         if not residual <= 10.0 * self.tolerance:  # far from balance tangents are indefinite
             scaled, residual = self._cycles("gmres", right)
         if not residual <= 10.0 * self.tolerance:
-            self.grids.worn = True
+            self.grids.stale = True
             raise SingularMatrix(
-                f"multigrid left {residual:.1e} of the right side after {self.most} steps; allowed "
-                f'are {self.tolerance:.0e}. Use linear = "direct"'
+                f"multigrid left {residual:.1e} of the right side after {self.max_iterations} "
+                f'steps; allowed are {self.tolerance:.0e}. Use linear = "direct"'
             )
         x = np.empty(len(b))
         x[self.order] = self.grids.scale * scaled
         return x
 
     def _cycles(self, method: str, b: Array) -> tuple[Array, float]:
-        """Solution of a Krylov method, and what it leaves of b, relative to it."""
+        """Solution of a Krylov method, and its residual relative to b."""
         x, steps, _ = self._solved(method, b)
-        self.grids.took(steps)
+        self.grids.note_iterations(steps)
         residual = np.linalg.norm(b - self.matrix @ x) / np.linalg.norm(b)
         return x, float(residual)
 
@@ -254,7 +257,12 @@ class Preconditioned:
         cycle = self.grids.of(self.matrix).aspreconditioner(cycle="V")
         norms = list[float]()
         with warnings.catch_warnings(record=True):
-            options = {"tol": self.tolerance, "maxiter": self.most, "M": cycle, "residuals": norms}
+            options = {
+                "tol": self.tolerance,
+                "maxiter": self.max_iterations,
+                "M": cycle,
+                "residuals": norms,
+            }
             x, info = getattr(krylov, method)(self.matrix, b, **options)
         return x, len(norms), info < 0
 
@@ -272,10 +280,10 @@ class Preconditioned:
             return None
         b = np.random.default_rng(0).uniform(-1.0, 1.0, len(self.order))
         falls = self._solved("cg", b)[2]
-        if not self.grids.own(self.matrix):
+        if not self.grids.is_made_of(self.matrix):
             if not falls:
                 return False
-            self.grids.renewed(self.matrix)  # those of another matrix may be what is indefinite
+            self.grids.rebuild(self.matrix)  # those of another matrix may be what is indefinite
             falls = self._solved("cg", b)[2]
         coarse = self.grids.of(self.matrix).levels[-1].A.toarray()
         values = np.linalg.eigvalsh((coarse + coarse.T) / 2.0)
@@ -283,15 +291,15 @@ class Preconditioned:
 
 
 @dataclass(eq=False)
-class OrFactors:
-    """Multigrid that goes over to factors for good where it fails.
+class AmgOrDirect:
+    """Multigrid, and after its first failure a direct solver for good.
 
-    second: None where they would be too large. taken: whether it has.
+    second: None where they would be too large. uses_second: whether it has.
     """
 
-    first: Multigrid
+    first: AlgebraicMultigrid
     second: LinearSolver | None
-    taken: bool = field(default=False, init=False)
+    uses_second: bool = field(default=False, init=False)
 
     @property
     def name(self) -> str:
@@ -301,18 +309,18 @@ class OrFactors:
 
     @property
     def _over(self) -> LinearSolver | None:
-        return self.second if self.taken else None
+        return self.second if self.uses_second else None
 
     def factorise(self, K: SparseMatrix) -> Factors:
         """Factors of K, (n, n); raises SingularMatrix."""
         if self._over is not None:
             return self._over.factorise(K)
-        return _Either(self, K, self.first.factorise(K))
+        return _AmgOrDirectFactors(self, K, self.first.factorise(K))
 
 
 @dataclass(eq=False)
-class _Either:
-    choice: OrFactors
+class _AmgOrDirectFactors:
+    choice: AmgOrDirect
     K: SparseMatrix
     factors: Factors
 
@@ -321,20 +329,20 @@ class _Either:
             return self.factors.solve(b)
         except SingularMatrix:
             second = self.choice.second
-            if second is None or self.choice.taken:
+            if second is None or self.choice.uses_second:
                 raise
-            self.choice.taken = True
+            self.choice.uses_second = True
             self.factors = second.factorise(self.K)
             return self.factors.solve(b)
 
     def unconstrained_unknown(self) -> None:
-        """See `Preconditioned`."""
+        """See `AmgFactors`."""
 
     def indefinite(self) -> bool | None:
-        """See `Preconditioned`; None where factors stand in."""
-        return self.factors.indefinite() if isinstance(self.factors, Preconditioned) else None
+        """See `AmgFactors`; None where factors stand in."""
+        return self.factors.indefinite() if isinstance(self.factors, AmgFactors) else None
 
     def pivots(self) -> Array | None:
-        """Of the factors that stand in, if they know them."""
+        """Pivots of the direct factors in use, if known."""
         method = getattr(self.factors, "pivots", None)
         return None if method is None else method()

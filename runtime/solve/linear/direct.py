@@ -16,11 +16,11 @@ Backend: TypeAlias = Literal["auto", "superlu", "pardiso", "petsc"]
 
 
 class MissingBackend(SoftehlError, ValueError):  # noqa: N818 (named after what it is)
-    """The linear solver that was asked for is not installed; the message says what to do."""
+    """Error: the requested linear solver is not installed; the message gives the remedy."""
 
 
-def choose(backend: Backend) -> Condenser:
-    """The solver of that name; "auto" is PARDISO where it is installed and SuperLU elsewhere.
+def direct_solver(backend: Backend) -> Condenser:
+    """Direct solver by name; "auto" is PARDISO if installed, else SuperLU.
 
     Raises MissingBackend if "pardiso" or "petsc" is asked for and not installed.
     """

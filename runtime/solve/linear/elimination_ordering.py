@@ -1,4 +1,4 @@
-"""Orders of elimination, which are found once for a pattern and serve its next matrices too."""
+"""Fill-reducing orderings, computed once for a pattern and reused by its later matrices."""
 
 from __future__ import annotations
 
@@ -26,23 +26,25 @@ NOTHING: Integers = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class EliminationOrder:
     """Order of rows and columns of a pattern before it is factorised.
 
-    given: indptr and indices of the pattern, csc. boundary: (m,) unknowns that come last, in this
+    pattern: indptr and indices of the pattern, csc. boundary: (m,) unknowns that come last, in this
     order. unknowns: (n,) all of them as they come. indptr, indices: the arranged pattern, csc.
-    places: (nnz,) where its entries are among those that are given.
+    positions: (nnz,) where its entries are among those that are given.
     """
 
-    given: tuple[Small, Small]
+    pattern: tuple[Small, Small]
     boundary: Integers
     unknowns: Integers
     indptr: Small
     indices: Small
-    places: Small
+    positions: Small
 
     @classmethod
-    def of(cls, K: SparseMatrix, unknowns: Integers, boundary: Integers = NOTHING) -> Order:
+    def of(
+        cls, K: SparseMatrix, unknowns: Integers, boundary: Integers = NOTHING
+    ) -> EliminationOrder:
         """Of the pattern of K, (n, n), in this order (n,), with the boundary put last."""
         n = K.shape[0]
         others: Flags = np.ones(n, dtype=bool)
@@ -59,41 +61,41 @@ class Order:
     def fits(self, K: SparseMatrix, boundary: Integers) -> bool:
         """True if K has this pattern, and the boundary is the same."""
         return (
-            _same(self.given[0], K.indptr)
-            and _same(self.given[1], K.indices)
+            _same(self.pattern[0], K.indptr)
+            and _same(self.pattern[1], K.indices)
             and np.array_equal(self.boundary, boundary)
         )
 
     def arranged(self, K: SparseMatrix) -> SparseMatrix:
         """K with its rows and columns in this order, csc; its data are its own."""
-        structure = K.data[self.places], self.indices, self.indptr
+        structure = K.data[self.positions], self.indices, self.indptr
         return csc_array(structure, shape=K.shape, copy=False)
 
 
 @dataclass
-class Orders:
-    """The latest orders, at most `most` of them: changes with every new pattern."""
+class OrderCache:
+    """The latest orders, at most `max_orders` of them: changes with every new pattern."""
 
-    most: int = 4
-    known: list[Order] = field(default_factory=list)
+    max_orders: int = 4
+    orders: list[EliminationOrder] = field(default_factory=list)
 
-    def find(self, K: SparseMatrix, boundary: Integers = NOTHING) -> Order | None:
+    def find(self, K: SparseMatrix, boundary: Integers = NOTHING) -> EliminationOrder | None:
         """Order of K, (n, n), with a boundary (m,); None if it is not known."""
-        return next((order for order in self.known if order.fits(K, boundary)), None)
+        return next((order for order in self.orders if order.fits(K, boundary)), None)
 
-    def add(self, order: Order) -> Order:
+    def add(self, order: EliminationOrder) -> EliminationOrder:
         """Remember an order, unless its pattern is very large; the oldest is forgotten."""
         if len(order.indices) <= MOST_ENTRIES:
-            self.known.append(order)
-            del self.known[: -self.most]
+            self.orders.append(order)
+            del self.orders[: -self.max_orders]
         return order
 
 
 @dataclass(frozen=True, eq=False)
-class Arranged:
+class PermutedFactors:
     """Factors of a matrix by those of the arranged one, whatever made them; satisfies `Factors`."""
 
-    order: Order
+    order: EliminationOrder
     factors: Factors
 
     def solve(self, b: Array) -> Array:
@@ -104,7 +106,7 @@ class Arranged:
 
     def transposed(self) -> Factors | None:
         """Factors of the transpose, by those of SuperLU; None for others."""
-        return Transposed(self) if isinstance(self.factors, SuperLU) else None
+        return TransposedFactors(self) if isinstance(self.factors, SuperLU) else None
 
     def pivots(self) -> Array | None:
         """Pivots of SuperLU, (n,), if they are all on the diagonal, else None."""
@@ -133,10 +135,10 @@ def _exchanges(order: Integers) -> int:
 
 
 @dataclass(frozen=True)
-class Transposed:
+class TransposedFactors:
     """Factors of the transpose by those of SuperLU; satisfies `Factors`."""
 
-    factors: Arranged
+    factors: PermutedFactors
 
     def solve(self, b: Array) -> Array:
         """x of K^T x = b, shapes (n,)."""

@@ -1,4 +1,4 @@
-"""Factors of a matrix that comes again: those of a linear problem are made once."""
+"""Cache of the last factorisation: a linear problem is factorised once."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from softehl.runtime.solve.linear.amg import Multigrid, OrFactors
+from softehl.runtime.solve.linear.amg import AlgebraicMultigrid, AmgOrDirect
 from softehl.runtime.solve.linear.linear_solver import Factors, LinearSolver, SparseMatrix
-from softehl.runtime.solve.linear.static_condensation import Condensing
+from softehl.runtime.solve.linear.static_condensation import CondensingSolver
 
 
 @dataclass(eq=False)
-class Kept:
-    """A linear solver that gives the same factors for the same matrix, to the last bit."""
+class FactorisationCache:
+    """A linear solver that returns the last factors for the same matrix, to the last bit."""
 
     solver: LinearSolver
     _last: tuple[SparseMatrix, Factors] | None = field(default=None, init=False, repr=False)
@@ -34,14 +34,16 @@ class Kept:
 
 
 def _same(A: SparseMatrix, B: SparseMatrix) -> bool:
-    """True if all entries of matrices, which nobody changes, are the same."""
+    """True if all entries of two matrices are the same."""
     parts = ((getattr(K, name) for K in (A, B)) for name in ("data", "indices", "indptr"))
     return all(a is b or np.array_equal(a, b) for a, b in parts)
 
 
-def iterating(solver: LinearSolver) -> LinearSolver | None:
-    """The solver, without a matrix that it keeps, if it makes no factors; else None."""
-    plain = solver.solver if isinstance(solver, Kept) else solver
-    inner = plain.solver if isinstance(plain, Condensing) else plain
-    iterates = isinstance(inner, Multigrid) or (isinstance(inner, OrFactors) and not inner.taken)
+def iterative_part(solver: LinearSolver) -> LinearSolver | None:
+    """The solver without its cache if it is iterative, else None."""
+    plain = solver.solver if isinstance(solver, FactorisationCache) else solver
+    inner = plain.solver if isinstance(plain, CondensingSolver) else plain
+    iterates = isinstance(inner, AlgebraicMultigrid) or (
+        isinstance(inner, AmgOrDirect) and not inner.uses_second
+    )
     return plain if iterates else None

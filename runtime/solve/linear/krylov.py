@@ -15,7 +15,7 @@ Apply = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class KrylovResult:
     """End of an iteration.
 
     x: (n,). iterations: that it took. converged: whether the residual is small enough. negative:
@@ -33,9 +33,9 @@ def conjugate_gradients(
     precondition: Apply,
     b: Array,
     tolerance: float,
-    most: int,
+    max_iterations: int,
     dot: Callable[[Array, Array], float] = np.dot,
-) -> Found:
+) -> KrylovResult:
     """x of A x = b from zero, until the residual is `tolerance` times b.
 
     A is symmetric; where it turns out to be indefinite, that is the end. dot: of two vectors, where
@@ -44,9 +44,9 @@ def conjugate_gradients(
     x, r = np.zeros_like(b), b.copy()
     target = tolerance * float(np.sqrt(dot(b, b)))
     p, previous_rho = np.zeros_like(b), 1.0
-    for k in range(most):
+    for k in range(max_iterations):
         if float(np.sqrt(dot(r, r))) <= target:
-            return Found(x, k, converged=True)
+            return KrylovResult(x, k, converged=True)
         z = precondition(r)
         product = float(dot(r, z))
         p *= product / previous_rho
@@ -54,17 +54,17 @@ def conjugate_gradients(
         Ap = apply(p)
         curvature = float(dot(p, Ap))
         if not curvature > 0.0 or not product > 0.0:
-            return Found(x if k else z, k + 1, converged=False, negative=curvature <= 0.0)
+            return KrylovResult(x if k else z, k + 1, converged=False, negative=curvature <= 0.0)
         x += product / curvature * p
         Ap *= product / curvature
         r -= Ap
         previous_rho = product
-    return Found(x, most, converged=False)
+    return KrylovResult(x, max_iterations, converged=False)
 
 
 def minimal_residuals(
-    apply: Apply, precondition: Apply, b: Array, tolerance: float, most: int
-) -> Found:
+    apply: Apply, precondition: Apply, b: Array, tolerance: float, max_iterations: int
+) -> KrylovResult:
     """x of A x = b for any A, by GMRES; otherwise as `conjugate_gradients`."""
     counts, n = [0], len(b)
 
@@ -73,15 +73,15 @@ def minimal_residuals(
 
     A = LinearOperator((n, n), matvec=apply, dtype=np.float64)
     M = LinearOperator((n, n), matvec=precondition, dtype=np.float64)
-    restart = min(_RESTART, most)
+    restart = min(_RESTART, max_iterations)
     x, failed = gmres(
         A,
         b,
         rtol=tolerance,
-        maxiter=-(-most // restart),
+        maxiter=-(-max_iterations // restart),
         M=M,
         restart=restart,
         callback=count_iteration,
         callback_type="pr_norm",
     )
-    return Found(np.asarray(x), counts[0], converged=not failed)
+    return KrylovResult(np.asarray(x), counts[0], converged=not failed)

@@ -47,7 +47,7 @@ class LinearSolver(Protocol):
 
     @property
     def name(self) -> str:
-        """The backend, as it is written into records."""
+        """Name of the backend in records."""
         ...
 
     def factorise(self, K: SparseMatrix) -> Factors:
@@ -55,7 +55,7 @@ class LinearSolver(Protocol):
         ...
 
 
-class Condensed(Protocol):
+class SchurComplement(Protocol):
     """K = [[K_II, K_IB], [K_BI, K_BB]] with the interior unknowns I eliminated; see `Condenser`.
 
     boundary: (m,) numbers of the unknowns B. schur: (m, m) S = K_BB - K_BI K_II^-1 K_IB.
@@ -72,7 +72,7 @@ class Condensed(Protocol):
         ...
 
     def reduce(self, r: Array) -> tuple[Array, Array]:
-        """r_B - K_BI K_II^-1 r_I, (m,), for r (n,), and what `extend` wants to know of it, (n,)."""
+        """r_B - K_BI K_II^-1 r_I, (m,), for r (n,), and the argument of `extend`, (n,)."""
         ...
 
     def extend(self, reduced: Array, x: Array) -> Array:
@@ -84,7 +84,7 @@ class Condensed(Protocol):
 class Condenser(LinearSolver, Protocol):
     """A linear solver that can also eliminate all unknowns but a few."""
 
-    def condense(self, K: SparseMatrix, boundary: Integers) -> Condensed:
+    def condense(self, K: SparseMatrix, boundary: Integers) -> SchurComplement:
         """Condensation of K, (n, n), onto unknowns (m,) in rising order; raises SingularMatrix."""
         ...
 
@@ -166,7 +166,7 @@ class Factorisation:
         return float(ratio.max(initial=0.0))
 
 
-def balanced(K: SparseMatrix) -> tuple[SparseMatrix, Array, tuple[Array, Array] | None]:
+def equilibrate(K: SparseMatrix) -> tuple[SparseMatrix, Array, tuple[Array, Array] | None]:
     """D K E, its row sums (n,), D and E, (n,): no row or column has entries that are all small
     beside those of the columns or rows that it joins. K itself and None where that is so already.
     Raises SingularMatrix as `checked_row_sums`.

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import LinearOperator, lobpcg
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.eigen import NoModes, require_count, signed, terms, without_rounding
-from softehl.runtime.solve.linear.amg import Modes, Multigrid
+from softehl.runtime.solve.linear.amg import AlgebraicMultigrid, NearNullspace
 
 _EXACT = 1e-5
 """Of the residual of a mode, relative to its inertia: the error of its square is about the square
@@ -18,14 +18,16 @@ of that."""
 _ROUND, _ROUNDS = 15, 10  # iterations until residuals are looked at, and how often
 
 
-def lowest(K: csc_array, M: csc_array, modes: Modes, count: int) -> tuple[Array, Array]:
+def lowest_modes(
+    K: csc_array, M: csc_array, modes: NearNullspace, count: int
+) -> tuple[Array, Array]:
     """As `eigen.lowest`: of K, (n, n), with rows of the identity where unknowns are prescribed.
 
     Raises NoModes, SingularMatrix.
     """
-    factors = Multigrid(modes).factorise(K)
+    factors = AlgebraicMultigrid(modes).factorise(K)
     A, grids, order = factors.matrix, factors.grids, factors.order
-    cycle, moving = grids.of(A).aspreconditioner(cycle="V"), np.where(grids.held, 0.0, 1.0)
+    cycle, moving = grids.of(A).aspreconditioner(cycle="V"), np.where(grids.prescribed, 0.0, 1.0)
     scale = diags_array(grids.scale * moving)
     B = (scale @ csc_array(M)[order][:, order] @ scale).tocsr()
     require_count(count, int((B.diagonal() > 0.0).sum()))

@@ -26,7 +26,7 @@ _POWERS = 12  # products for an estimate of the largest eigenvalue, which is the
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class MultigridLevel:
     """An operator with the inverse of its diagonal, (n,), and (n, m) from the next level.
 
     top: largest eigenvalue of the operator over its diagonal.
@@ -38,12 +38,12 @@ class Level:
     top: float
 
     @classmethod
-    def of(cls, apply: Apply, diagonal: Array, interpolation: csr_array) -> Level:
+    def of(cls, apply: Apply, diagonal: Array, interpolation: csr_array) -> MultigridLevel:
         """With an estimate of the largest eigenvalue."""
         safe = np.where(diagonal > 0.0, diagonal, 1.0)
-        return cls(apply, 1.0 / safe, interpolation, 1.1 * largest(apply, safe))
+        return cls(apply, 1.0 / safe, interpolation, 1.1 * largest_eigenvalue(apply, safe))
 
-    def smoothed(self, b: Array, x: Array | None) -> Array:
+    def smooth(self, b: Array, x: Array | None) -> Array:
         """x after a smoothing of A x = b; None: from zero, which spares a product."""
         centre = 0.5 * self.top * (1.0 + 1.0 / RANGE)
         half = 0.5 * self.top * (1.0 - 1.0 / RANGE)
@@ -65,10 +65,10 @@ class Level:
 
 
 @dataclass(frozen=True, eq=False)
-class Multigrid:
+class MultigridCycle:
     """Levels, the finest first, and a solver of the coarsest."""
 
-    levels: Sequence[Level]
+    levels: Sequence[MultigridLevel]
     coarsest: Apply
 
     def __call__(self, b: Array) -> Array:
@@ -79,13 +79,13 @@ class Multigrid:
         if k == len(self.levels):
             return self.coarsest(b)
         level = self.levels[k]
-        x = level.smoothed(b, None)
+        x = level.smooth(b, None)
         r = level.interpolation.T @ (b - level.apply(x))
         x = x + level.interpolation @ self._cycle(r, k + 1)
-        return level.smoothed(b, x)
+        return level.smooth(b, x)
 
 
-def largest(apply: Apply, diagonal: Array) -> float:
+def largest_eigenvalue(apply: Apply, diagonal: Array) -> float:
     """Largest eigenvalue of an operator over its diagonal, estimated by Lanczos' method."""
     root = 1.0 / np.sqrt(diagonal)
     v = np.random.default_rng(0).uniform(-1.0, 1.0, len(diagonal))

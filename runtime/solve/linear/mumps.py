@@ -24,7 +24,7 @@ from softehl.runtime.solve.linear.linear_solver import (
     Factorisation,
     SingularMatrix,
     SparseMatrix,
-    balanced,
+    equilibrate,
 )
 from softehl.runtime.solve.linear.schur_complement import SchurBySolves
 
@@ -32,7 +32,7 @@ _PAUSE = 5e-4  # seconds between looks for a task: who waits leaves the core to 
 
 
 @dataclass(eq=False)
-class Team:
+class MumpsTeam:
     """Process 0 and those that serve it. matrices: by number, those that are factorised."""
 
     matrices: dict[int, Any] = field(default_factory=dict)
@@ -40,7 +40,7 @@ class Team:
     numbers: int = 0
 
     def call(self, task: str, number: int, parts: list[Any]) -> list[Any]:
-        """Have every process do a task, with its part each; what they give.  SingularMatrix."""
+        """Results of a task on every process, each with its part; raises SingularMatrix."""
         comm, old = world(), tuple(self.forgotten)
         self.forgotten.clear()
         for rank in range(1, comm.size):
@@ -57,19 +57,19 @@ class Team:
             self.matrices.pop(gone).destroy()
         try:
             if task == "factorise":
-                self.matrices[number] = _factors(*part)
+                self.matrices[number] = _factors(part)
                 return None
             return _solution(self.matrices[number], part)
         except petsc().Error as error:
             return " ".join(str(error).split())
 
-    def factorise(self, K: SparseMatrix) -> Spread:
+    def factorise(self, K: SparseMatrix) -> MumpsFactors:
         """Factors of K, (n, n), on all processes."""
         comm, rows = world(), csr_array(K)
         bounds = np.linspace(0, rows.shape[0], comm.size + 1).astype(int)
         parts = [_rows(rows, int(a), int(b)) for a, b in pairwise(bounds)]
         self.numbers += 1
-        factors = Spread(self, self.numbers, bounds)
+        factors = MumpsFactors(self, self.numbers, bounds)
         weakref.finalize(factors, self.forgotten.append, self.numbers)
         self.call("factorise", self.numbers, parts)
         return factors
@@ -81,8 +81,9 @@ def _rows(K: csr_array[np.float64], first: int, last: int) -> tuple[Any, ...]:
     return K.shape[0], last - first, part.indptr.astype(kind), part.indices.astype(kind), part.data
 
 
-def _factors(size: int, n_rows: int, starts: Any, columns: Any, values: Array) -> Any:
+def _factors(rows: tuple[Any, ...]) -> Any:
     PETSc, comm = petsc(), world()
+    size, n_rows, starts, columns, values = rows
     matrix = PETSc.Mat().createAIJ(((n_rows, size), (n_rows, size)), csr=(starts, columns, values))
     ksp = PETSc.KSP().create(comm)
     ksp.setOperators(matrix)
@@ -112,10 +113,10 @@ def _solution(ksp: Any, b: Array) -> Array:
 
 
 @dataclass(eq=False)
-class Spread:
+class MumpsFactors:
     """A factorised matrix whose rows are spread over processes, from bounds[k] to bounds[k + 1]."""
 
-    team: Team
+    team: MumpsTeam
     number: int
     bounds: Integers
 
@@ -135,7 +136,7 @@ class Mumps:
     exceeds `accuracy` is refused.
     """
 
-    team: Team
+    team: MumpsTeam
     refinement: int = 1
     accuracy: float = 1e-6
     name: str = "petsc"
@@ -148,7 +149,7 @@ class Mumps:
 
     def factorise(self, K: SparseMatrix) -> Factorisation:
         """Factors of K, square, shape (n, n), csc; raises SingularMatrix."""
-        K, row_sums, units = balanced(K)
+        K, row_sums, units = equilibrate(K)
         factors = self.team.factorise(K)
         return Factorisation(K, factors, row_sums, self.refinement, self.accuracy, units=units)
 
@@ -163,8 +164,8 @@ def require() -> None:
 
 
 @cache
-def _team() -> Team:
-    return Team()
+def _team() -> MumpsTeam:
+    return MumpsTeam()
 
 
 @contextmanager
@@ -183,7 +184,7 @@ def leading() -> Iterator[bool]:
 
 
 def _serve(comm: Any) -> None:
-    """Do what process 0 asks for, until it says that it was all."""
+    """Carry out the tasks of process 0 until it ends."""
     team = _team()
     while True:
         while not comm.iprobe(source=0):

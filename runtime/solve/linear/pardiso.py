@@ -22,8 +22,8 @@ from softehl.runtime.solve.linear.linear_solver import (
     Factorisation,
     SingularMatrix,
     SparseMatrix,
-    balanced,
     checked_row_sums,
+    equilibrate,
 )
 
 Small = NDArray[np.int32]
@@ -177,7 +177,7 @@ def _call(
 
 @dataclass(frozen=True, eq=False)
 class _Lent:
-    """Use of a handle; when it is forgotten, another matrix of the pattern may have the handle."""
+    """Lease of a handle; after its release another matrix of the pattern may use the handle."""
 
     handle: _Handle
 
@@ -194,13 +194,13 @@ class PartialFactors:
     schur: Array
 
     def reduce(self, r: Array) -> tuple[Array, Array]:
-        """See `Condensed`."""
+        """See `SchurComplement`."""
         y = np.empty(self.handle.size)
         self.handle.call(_FORWARD, np.ascontiguousarray(r, dtype=np.float64), y)
         return y[self.boundary].copy(), y
 
     def extend(self, reduced: Array, x: Array) -> Array:
-        """See `Condensed`."""
+        """See `SchurComplement`."""
         y, full = reduced.copy(), np.empty(self.handle.size)
         y[self.boundary] = x
         self.handle.call(_BACKWARD, y, full)
@@ -251,7 +251,7 @@ class Pardiso:
 
     def factorise(self, K: SparseMatrix) -> Factorisation:
         """Factors of K, square, shape (n, n), csc; raises SingularMatrix."""
-        K, row_sums, units = balanced(K)
+        K, row_sums, units = equilibrate(K)
         handle = self._handle(K, np.empty(0, dtype=np.int64))
         handle.factorise(K, np.empty(0))
         lent = _Lent(handle)

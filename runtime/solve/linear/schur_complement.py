@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.solve.linear.elimination_ordering import Arranged, Order
+from softehl.runtime.solve.linear.elimination_ordering import EliminationOrder, PermutedFactors
 from softehl.runtime.solve.linear.linear_solver import (
     Factors,
     SingularMatrix,
@@ -28,7 +28,7 @@ SparseFactors: TypeAlias = Any
 
 @dataclass(frozen=True, eq=False)
 class SchurBySolves:
-    """A condensation by solves with many right sides; satisfies `Condensed`.
+    """A condensation by solves with many right sides; satisfies `SchurComplement`.
 
     interior: (n - m,) eliminated unknowns. couplings: K_BI and K_IB.
     """
@@ -62,13 +62,13 @@ class SchurBySolves:
         return cls(boundary, schur, interior, factors, (coupling, columns))
 
     def reduce(self, r: Array) -> tuple[Array, Array]:
-        """See `Condensed`."""
+        """See `SchurComplement`."""
         y = np.zeros(len(r))
         y[self.interior] = self.factors.solve(r[self.interior])
         return np.asarray(r[self.boundary] - self.couplings[0] @ y[self.interior]), y
 
     def extend(self, reduced: Array, x: Array) -> Array:
-        """See `Condensed`."""
+        """See `SchurComplement`."""
         full = reduced.copy()
         full[self.interior] -= self.factors.solve(np.asarray(self.couplings[1] @ x))
         full[self.boundary] = x
@@ -77,7 +77,7 @@ class SchurBySolves:
 
 @dataclass(frozen=True, eq=False)
 class SchurByFactors:
-    """A condensation by one factorisation in which the boundary comes last; see `Condensed`.
+    """A condensation by one factorisation in which the boundary comes last; see `SchurComplement`.
 
     What is factorised is K with a stiffness added at the boundary, so that it is regular whatever
     holds the body. stiffened: (m, m) its Schur complement. factors: of it, with the rows of the
@@ -93,14 +93,14 @@ class SchurByFactors:
     def of(
         cls,
         K: SparseMatrix,
-        order: Order,
+        order: EliminationOrder,
         factors_of: Callable[[SparseMatrix], SparseFactors],
-        most: int,
+        max_entries: int,
     ) -> SchurByFactors:
         """Of K, (n, n), arranged with the boundary last; factors_of: without another order.
 
-        most: entries of factors, of which a copy is made for a while. Raises SingularMatrix, also
-        where there are more of them or a row of the boundary became a pivot of the interior.
+        max_entries: largest number of entries of factors that are copied for a while. Raises
+        SingularMatrix, also if there are more or a row of the boundary is a pivot of the interior.
         """
         arranged, first = order.arranged(K), K.shape[0] - len(order.boundary)
         added = _stiffen(arranged, first)
@@ -109,20 +109,20 @@ class SchurByFactors:
         rows, columns = factors.perm_r[first:] - first, factors.perm_c[first:] - first
         if min(rows.min(initial=0), columns.min(initial=0)) < 0:
             raise SingularMatrix("a row of the boundary is a pivot of the interior")
-        if factors.nnz > most:
+        if factors.nnz > max_entries:
             raise SingularMatrix(f"factors of {factors.nnz} entries are not copied")
         lower, upper = (part[first:, first:].toarray() for part in (factors.L, factors.U))
         stiffened = (lower @ upper)[rows][:, columns] / _LAST
         schur = stiffened - np.diag(added)
-        return cls(order.boundary, schur, stiffened, Arranged(order, factors))
+        return cls(order.boundary, schur, stiffened, PermutedFactors(order, factors))
 
     def reduce(self, r: Array) -> tuple[Array, Array]:
-        """See `Condensed`."""
+        """See `SchurComplement`."""
         y = self._solve(r, r[self.boundary])
         return np.asarray(self.stiffened @ y[self.boundary]), y
 
     def extend(self, reduced: Array, x: Array) -> Array:
-        """See `Condensed`."""
+        """See `SchurComplement`."""
         load = self.stiffened @ (x - reduced[self.boundary])
         full = reduced + self._solve(np.zeros(len(reduced)), load)
         full[self.boundary] = x

@@ -1,4 +1,4 @@
-"""Condensation of unknowns that elements have for themselves, before the rest is factorised.
+"""Static condensation of internal unknowns of elements before the factorisation.
 
 With K = [[K_EE, K_EI], [K_IE, K_II]], where the block K_II of internal unknowns falls into a small
 one for each element, what is solved is S = K_EE - K_EI K_II^-1 K_IE; the internal unknowns follow
@@ -23,8 +23,8 @@ from softehl.runtime.solve.singularity_check import JudgesSingularity, unconstra
 
 
 @dataclass(frozen=True, eq=False)
-class Condensing:
-    """A linear solver of what is left when internal unknowns are eliminated.
+class CondensingSolver:
+    """A linear solver that condenses internal unknowns first.
 
     groups: (n, k) numbers of the internal unknowns of n like elements. A matrix may have rows
     beyond those of the problem, as paths by arc length do.
@@ -45,19 +45,19 @@ class Condensing:
             mask[group] = False
         return np.flatnonzero(mask)
 
-    def factorise(self, K: SparseMatrix) -> Eliminated:
+    def factorise(self, K: SparseMatrix) -> CondensedFactors:
         """Factors of K, (n, n); raises SingularMatrix, also where internal unknowns are loose."""
         rows, parts, E = csr_array(K), [], self.external(K.shape[0])
         S = rows[E][:, E]
         for group in self.groups:
             inner = group.ravel()
-            inverse, sign = inverted(rows[inner][:, inner], group)
+            inverse, sign = block_inverse(rows[inner][:, inner], group)
             out, back = rows[inner][:, E], rows[E][:, inner]
             S = S - back @ (inverse @ out)
             parts.append(_Group(inner, inverse, csr_array(out), csr_array(back), sign))
         if not np.isfinite(S.data).all():
             raise SingularMatrix("the matrix has entries that are not finite")
-        return Eliminated(E, tuple(parts), self.solver.factorise(csc_array(S)))
+        return CondensedFactors(E, tuple(parts), self.solver.factorise(csc_array(S)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,31 +74,31 @@ class _Group:
 
 
 @dataclass(frozen=True, eq=False)
-class Eliminated:
-    """Factors of a matrix by those of what is left of it; `external` are the unknowns there."""
+class CondensedFactors:
+    """Factors of a matrix by those of its condensed one; `external` are the unknowns of that."""
 
     external: Integers
     parts: tuple[_Group, ...]
-    rest: Factors
+    external_factors: Factors
 
     def solve(self, b: Array) -> Array:
         """x of K x = b, (n,)."""
         x, right = np.empty(len(b)), b[self.external]
         for part in self.parts:
             right = right - part.back @ (part.inverse @ b[part.inner])
-        x[self.external] = external = self.rest.solve(right)
+        x[self.external] = external = self.external_factors.solve(right)
         for part in self.parts:
             x[part.inner] = part.inverse @ (b[part.inner] - part.out @ external)
         return x
 
     def pivots(self) -> Array | None:
         """Pivots of the rest (m,), see `Factorisation.pivots`."""
-        method = getattr(self.rest, "pivots", None)
+        method = getattr(self.external_factors, "pivots", None)
         return None if method is None else method()
 
     def sign(self) -> float | None:
         """Sign of the determinant; None where it is not known."""
-        method = getattr(self.rest, "sign", None)
+        method = getattr(self.external_factors, "sign", None)
         rest_sign = None if method is None else method()
         return (
             None if rest_sign is None else rest_sign * float(np.prod([p.sign for p in self.parts]))
@@ -106,24 +106,24 @@ class Eliminated:
 
     def indefinite(self) -> bool | None:
         """True if the rest has a negative eigenvalue; None where it is not known."""
-        method = getattr(self.rest, "indefinite", None)
+        method = getattr(self.external_factors, "indefinite", None)
         return None if method is None else method()
 
     def unconstrained_unknown(self) -> int | None:
         """See `JudgesSingularity`: what K_II admits is regular, so the rest decides."""
         number = (
-            self.rest.unconstrained_unknown()
-            if isinstance(self.rest, JudgesSingularity)
-            else self._loose()
+            self.external_factors.unconstrained_unknown()
+            if isinstance(self.external_factors, JudgesSingularity)
+            else self._unconstrained_external()
         )
         return None if number is None else int(self.external[number])
 
-    def _loose(self) -> int | None:
-        matrix = getattr(self.rest, "matrix", None)
-        return None if matrix is None else unconstrained_unknown(matrix, self.rest)
+    def _unconstrained_external(self) -> int | None:
+        matrix = getattr(self.external_factors, "matrix", None)
+        return None if matrix is None else unconstrained_unknown(matrix, self.external_factors)
 
 
-def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, float]:
+def block_inverse(K: csr_array, group: Integers) -> tuple[bsr_array, float]:
     """Inverse of a matrix of one block for each of n elements, and the sign of its determinant.
 
     Raises SingularMatrix.
@@ -136,7 +136,7 @@ def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, float]:
     np.add.at(blocks, (element, entries.row % k, entries.col % k), entries.data)
     inverse = inverses(blocks)
     if not np.isfinite(inverse).all():
-        bad = weakest(blocks)
+        bad = most_singular(blocks)
         row = int(group[bad, 0])
         raise SingularMatrix(f"internal unknowns of element {bad} cannot be eliminated", row)
     where = np.arange(n)
@@ -152,7 +152,7 @@ def inverses(blocks: Array) -> Array:
         return np.full_like(blocks, np.nan)
 
 
-def weakest(blocks: Array) -> int:
+def most_singular(blocks: Array) -> int:
     """Number of the matrix of (n, k, k) that is closest to singular."""
     sizes = np.abs(blocks).max(axis=(1, 2), initial=0.0)
     return int(np.argmin(np.abs(np.linalg.det(blocks / np.maximum(sizes, 1e-300)[:, None, None]))))

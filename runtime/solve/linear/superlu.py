@@ -1,4 +1,4 @@
-"""SuperLU, which comes with SciPy."""
+"""SuperLU of SciPy."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from softehl.runtime.arrays import Integers
 from softehl.runtime.solve.linear.elimination_ordering import (
     MOST_COPIED,
     MOST_ENTRIES,
-    Arranged,
-    Order,
-    Orders,
+    EliminationOrder,
+    OrderCache,
+    PermutedFactors,
     without_zeros,
 )
 from softehl.runtime.solve.linear.linear_solver import (
-    Condensed,
     Factorisation,
     Factors,
+    SchurComplement,
     SingularMatrix,
     SparseMatrix,
-    balanced,
     checked_row_sums,
+    equilibrate,
 )
 from softehl.runtime.solve.linear.schur_complement import SchurByFactors, SchurBySolves
 
@@ -48,15 +48,15 @@ class SuperLU:
     refinement: int = 1
     accuracy: float = 1e-6
     name: str = "superlu"
-    orders: Orders = field(default_factory=Orders, compare=False, repr=False)
+    orders: OrderCache = field(default_factory=OrderCache, compare=False, repr=False)
 
     def factorise(self, K: SparseMatrix) -> Factorisation:
         """Factors of K, square, shape (n, n), csc; raises SingularMatrix."""
-        K, row_sums, units = balanced(K)
+        K, row_sums, units = equilibrate(K)
         settings = self.refinement, self.accuracy
         return Factorisation(K, self._ordered(K), row_sums, *settings, units=units)
 
-    def condense(self, K: SparseMatrix, boundary: Integers) -> Condensed:
+    def condense(self, K: SparseMatrix, boundary: Integers) -> SchurComplement:
         """See `Condenser`: by one factorisation unless pivots or memory forbid it."""
         checked_row_sums(K)
         try:
@@ -78,17 +78,17 @@ class SuperLU:
         if K.nnz > MOST_ENTRIES:
             return self.factors(K)
         order = self._order(K)
-        return Arranged(order, self._as_it_is(order.arranged(K)))
+        return PermutedFactors(order, self._as_it_is(order.arranged(K)))
 
-    def _order(self, K: SparseMatrix) -> Order:
+    def _order(self, K: SparseMatrix) -> EliminationOrder:
         """The order of the pattern of K, (n, n)."""
         cached = self.orders.find(K)
-        return cached or self.orders.add(Order.of(K, self._found(K)))
+        return cached or self.orders.add(EliminationOrder.of(K, self._found(K)))
 
-    def _last(self, K: SparseMatrix, boundary: Integers) -> Order:
+    def _last(self, K: SparseMatrix, boundary: Integers) -> EliminationOrder:
         """The order of the pattern of K, (n, n), with the boundary (m,) last."""
         cached = self.orders.find(K)
-        return Order.of(K, cached.unknowns if cached else self._found(K), boundary)
+        return EliminationOrder.of(K, cached.unknowns if cached else self._found(K), boundary)
 
     def _found(self, K: SparseMatrix) -> Integers:
         """All unknowns (n,) as they are eliminated: an incomplete factorisation costs least."""

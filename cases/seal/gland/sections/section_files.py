@@ -30,7 +30,7 @@ from softehl.cases.seal.meshing.section_mesh import SectionMesh, corner_jacobian
 from softehl.cases.seal.meshing.subdivision import subdivided
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.contact.body_thickness import in_chains
-from softehl.runtime.mesh.face_matching import once
+from softehl.runtime.mesh.face_matching import unrepeated_faces
 from softehl.runtime.mesh.mesh import Mesh
 
 _UNITS = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0, 13: 1e-3}  # $INSUNITS of DXF -> mm
@@ -234,7 +234,7 @@ def _counterclockwise(points: Array, quads: Integers) -> Integers:
 
 def _loop(points: Array, quads: Integers) -> Integers:
     """Nodes (B,) of the boundary, counterclockwise.  Raises OutlineError where it is no loop."""
-    edges = once(np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)]), 2)
+    edges = unrepeated_faces(np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)]), 2)
     starts, times = np.unique(edges[:, 0], return_counts=True)
     if times.max() > 1:
         z, r = points[starts[times.argmax()]]
