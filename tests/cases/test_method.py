@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.observer import Step
+from softehl.cases.harness.row import OK
 from softehl.cases.seal.report.section import boundary_edges
 from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import (
     COLLAPSED,
+    OSCILLATING,
+    UNCERTAIN,
     UNDER_RESOLVED,
     ContactState,
     FilmState,
@@ -216,3 +219,15 @@ def test_a_low_order_is_reached_from_a_higher_one() -> None:
     outcome = run(oring(pressure_order=3, **parameters), recorder)
     assert outcome.converged, outcome.message
     assert outcome.states[-1].h_star_um == pytest.approx(0.726024, rel=1e-4)
+
+
+def test_states_of_a_coarse_mesh_are_labelled(default: tuple[Outcome, Recorder]) -> None:
+    """Density 2: outstroke is sound, instroke oscillates, its slow end has too short an inlet."""
+    out, back = default[0].states[:5], default[0].states[5:]
+    assert [s.verdict for s in out] == [UNCERTAIN] * 5  # sound, but nothing says how accurate
+    assert [s.verdict for s in back[-3:]] == [OSCILLATING, OSCILLATING, UNDER_RESOLVED]
+    assert max(s.oscillation_index for s in out) < 0.2 < back[2].oscillation_index
+    for states in (out, back):  # the inlet shortens as the film thins
+        segments = [s.inlet_segments for s in states]
+        assert segments == sorted(segments, reverse=True)
+    assert all(bool(s.advice) == (s.verdict != OK) for s in default[0].states)

@@ -44,3 +44,13 @@ def test_a_name_that_is_given_twice_is_refused(call: str) -> None:
     getattr(m, call)(v=old)
     with pytest.raises(ModelError, match="v is given twice in model sums"):
         getattr(m, call)(v=old)
+
+
+def test_what_is_frozen_in_one_potential_varies_in_another_under_its_own_name() -> None:
+    m = model()
+    x = m.unknown("x")
+    a = m.define("a", x**2)
+    m.potential(a * x, constant=[a])
+    m.potential(a)
+    with pytest.raises(ModelError, match=r"a is constant in one potential.*m.define\('a_frozen'"):
+        m.finish()

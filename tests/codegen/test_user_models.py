@@ -358,3 +358,18 @@ def test_definitions_shipped_names_and_folders_are_loaded() -> None:
 
 
 # -------------------------------------------------------------------------------- pages of fields
+
+
+def test_a_local_iteration_without_a_solution_asks_for_an_example(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The oracle takes 200 steps, the kernel 25 at most: here one, which is not enough."""
+    local = "m.implicit('s', lambda s: s**3 + s - k - u, start=5, iterations=ITERATIONS)"
+    text = spring(energy=f"{local} ** 2")
+    model_file(text.replace("ITERATIONS", "1"))
+    assert run("mine.py") == 2
+    printed = capsys.readouterr().err
+    assert "its local iteration finds no solution at random states" in printed
+    assert "m.example(k=...)" in printed
+    model_file(text.replace("ITERATIONS", "25"))
+    assert run("mine.py") == 0

@@ -175,3 +175,12 @@ def test_a_property_that_the_page_does_not_allow_ends_the_analysis(tmp_path: Pat
     done = subprocess.run([tmp_path / "host"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 2
     assert "link, element 1: k > 0 is required" in done.stderr
+
+
+def test_the_deck_has_what_the_page_needs() -> None:
+    deck = host_files.files(page("tri6", A**2, A**3, conservative=False), "abaqus")[
+        "random_tri6.inp"
+    ]
+    assert "TYPE=U1, NODES=6, COORDINATES=2, PROPERTIES=2, VARIABLES=9, UNSYMM\n" in deck
+    assert "UNSYMM\n11, 12\n4, 11\n*ELEMENT" in deck
+    assert "*HEAT TRANSFER" in deck

@@ -77,3 +77,11 @@ def test_a_page_without_a_tangent_is_refused() -> None:
     m.offer(tasks=["residual"])
     with pytest.raises(TargetError, match="force offers no task tangent, which target jax needs"):
         host_files.files(m.finish(), "jax")
+
+
+def test_the_module_names_what_the_page_has() -> None:
+    texts = host_files.files(page("line2", A**2 * K, A * B, conservative=True), "jax")
+    module = texts["random_line2_jax.py"]
+    compile(module, "random_line2_jax.py", "exec")
+    assert "PARAMETERS = {'k': 'a parameter'}" in module
+    assert "random_line2_d_a_old2_op" in texts["jax_ops.cc"]

@@ -17,7 +17,7 @@ import softehl
 from softehl.codegen.abi import TargetError
 from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.evaluation import State, Walk
-from softehl.codegen.hosts.material_response import VOIGT, Measure, Response, response
+from softehl.codegen.hosts.material_response import VOIGT, Measure, Response, response, solid
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.language.model import Model
@@ -245,3 +245,14 @@ def test_no_deformation_and_plane_stress_are_told(umat: ctypes.CDLL) -> None:
     before = ctypes.c_int.in_dll(umat, "ended").value
     asked(umat, np.eye(3), 2, 1)
     assert ctypes.c_int.in_dll(umat, "ended").value == before + 1
+
+
+def test_a_law_in_a_page_of_a_study() -> None:
+    """Uniaxial strain: P = mu (l - 1 / l) + K (l - 1)."""
+    study = softehl.Study(softehl.Mesh.box((1, 1, 1), cells=(1, 1, 1), shape="tetrahedron"))
+    study.add("body", solid(neo), mu=MU, K=BULK)
+    study.fix("left", u_x=0)
+    study.fix("right", u_x=0.3)
+    study.fix(np.arange(8), u_y=0, u_z=0)
+    pull = study.solve().reaction("right")["u_x"]
+    assert pull == pytest.approx(MU * (1.3 - 1 / 1.3) + BULK * 0.3, rel=1e-12)
