@@ -106,7 +106,7 @@ class Definition:
         Its gradient is the residual.
     constant : tuple of Node
         Values without variation.
-    given : mapping
+    prescribed : mapping
         Value -> derivatives in place of the true ones.
     directions : tuple of Node
         Unknowns by which the residual is derived.
@@ -128,7 +128,7 @@ class Definition:
         Basis values of the interpolated field.
     nodal : tuple
         First unknown and number of components of fields with unknowns at all nodes.
-    places : tuple
+    dof_nodes : tuple
         Name and node of every unknown.
     history : tuple of str
         Point data with new values after a step.
