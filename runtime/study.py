@@ -41,14 +41,14 @@ from softehl.runtime.definition.element_blocks import (
 from softehl.runtime.definition.kernel_loading import Origin, Source
 from softehl.runtime.definition.problem_definition import (
     Datum,
-    Statement,
+    ProblemDefinition,
     StudyError,
     Where,
 )
 from softehl.runtime.discretisation.loads import Amount
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.system import System
-from softehl.runtime.equations.system_builder import equations
+from softehl.runtime.equations.system_builder import build_system
 from softehl.runtime.fit import least_squares
 from softehl.runtime.fit import objective as inverse
 from softehl.runtime.fit.jax_operation import Operation
@@ -61,7 +61,7 @@ from softehl.runtime.results.result import Modes, Result
 from softehl.runtime.sensitivity.input_parsing import By
 from softehl.runtime.sensitivity.inputs import Key
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.suggestions import few
+from softehl.runtime.suggestions import short_list
 
 
 @dataclass(eq=False)
@@ -86,13 +86,13 @@ class Study:
 
     mesh: Mesh
     geometry: str | None = None
-    _statement: Statement = field(init=False, repr=False)
+    _statement: ProblemDefinition = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Raises MeshError for a cell that is turned inside out, StudyError for a geometry."""
         self.mesh.check()
         geometry_of(self.mesh, self.geometry)
-        self._statement = Statement(self.mesh, self._ring)
+        self._statement = ProblemDefinition(self.mesh, self._ring)
 
     def __setattr__(self, name: str, value: object) -> None:
         """Raises AttributeError for what a study is of."""
@@ -105,22 +105,24 @@ class Study:
     def __repr__(self) -> str:
         """Summary in one line."""
         written = self._statement
-        blocks = few(f"{b.name} ({b.kernel.name})" for b in written.blocks.values())
+        blocks = short_list(f"{b.name} ({b.kernel.name})" for b in written.blocks.values())
         calls = Counter(["fix"] * len(written.conditions) + [f.what for f in written.forces])
         calls.update(start=len(written.start), contact=len(written.contacts))
-        told = ", ".join(f"{count} {name}" for name, count in calls.items() if count) or "no loads"
+        summary = (
+            ", ".join(f"{count} {name}" for name, count in calls.items() if count) or "no loads"
+        )
         kinds = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in self.mesh.cells.items())
-        return f"<Study: {kinds}; blocks: {blocks}; {told}>"
+        return f"<Study: {kinds}; blocks: {blocks}; {summary}>"
 
     def __copy__(self) -> Study:
         """A study with the same statements so far, on the same mesh."""
-        return self._with_definition(self._statement.copied())
+        return self._with_definition(self._statement.copy())
 
     def __deepcopy__(self, memo: object) -> Study:
         """As a copy: what was written down does not change."""
         return self.__copy__()
 
-    def _with_definition(self, definition: Statement) -> Study:
+    def _with_definition(self, definition: ProblemDefinition) -> Study:
         """A study with the same geometry and another definition."""
         other = object.__new__(type(self))
         vars(other).update({**vars(self), "mesh": definition.mesh, "_statement": definition})
@@ -200,7 +202,7 @@ class Study:
             form_of(name, shared, called, along, rule, constant),
             on=elements_on(name, on),
             cells=cells,
-            given=given,
+            arguments=given,
         )
 
     def load(self, where: Where, **components: Amount) -> None:
@@ -419,7 +421,7 @@ class Study:
         StudyError
             Statements contradict each other.
         """
-        return equations(self._statement, fields)
+        return build_system(self._statement, fields)
 
     def solve(
         self,

@@ -14,7 +14,7 @@ _FEW = 2
 """Names that a hint has at most."""
 
 
-def meant(given: object, known: Iterable[str]) -> str:
+def did_you_mean(given: object, known: Iterable[str]) -> str:
     """A hint at the name that was probably meant, at several that are as likely, or nothing.
 
     Capitals do not count. A word that is like no name may be one of the words of a few names.
@@ -24,20 +24,22 @@ def meant(given: object, known: Iterable[str]) -> str:
     likeness = [difflib.SequenceMatcher(None, name, word).ratio() for name in close]
     likely = [n for n, r in zip(close, likeness, strict=True) if r > likeness[0] - _AS_GOOD]
     likely = likely or [name.lower() for name in names if word in name.lower().split("_")]
-    found = [repr(name) for name in names if name.lower() in likely]
-    return f" (did you mean {' or '.join(found)}?)" if 0 < len(found) <= _FEW else ""
+    likely_names = [repr(name) for name in names if name.lower() in likely]
+    return f" (did you mean {' or '.join(likely_names)}?)" if 0 < len(likely_names) <= _FEW else ""
 
 
-def listed(known: Iterable[str]) -> str:
+def join_names(names: Iterable[str]) -> str:
     """Names for a message, "none" where there are none."""
-    return ", ".join(known) or "none"
+    return ", ".join(names) or "none"
 
 
-def few(known: Iterable[str], most: int = 5) -> str:
+def short_list(known: Iterable[str], max_names: int = 5) -> str:
     """The first of many names and how many there are."""
     names = list(known)
     return (
-        listed(names) if len(names) <= most + 1 else f"{listed(names[:most])}, ... ({len(names)})"
+        join_names(names)
+        if len(names) <= max_names + 1
+        else f"{join_names(names[:max_names])}, ... ({len(names)})"
     )
 
 

@@ -391,8 +391,8 @@ FAULTS = (
     ),
     Fault(
         "runtime/sensitivity/adjoint.py",
-        "found[:, :, k] += (self.mu * after)",
-        "found[:, :, k] -= (self.mu * after)",
+        "gradient[:, :, k] += (self.mu * after)",
+        "gradient[:, :, k] -= (self.mu * after)",
         "tests/runtime/test_derivatives.py",
     ),
     Fault(

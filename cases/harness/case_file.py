@@ -26,7 +26,7 @@ from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import Parameters, files_of, keys_of
 from softehl.cases.harness.units import is_number, is_quantity
 from softehl.runtime.kernels.shared_library import KernelError
-from softehl.runtime.suggestions import meant
+from softehl.runtime.suggestions import did_you_mean
 
 Shipped = Mapping[str, str]
 """Name of a case that ships -> its module, which is imported when the case is needed."""
@@ -147,7 +147,7 @@ def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
     if not isinstance(name, str) or not (name in shipped or is_reference(name)):
         told = "no case" if name is None else f"case = {shown(name)}"
         allowed = " or ".join(f'case = "{known}"' for known in shipped)
-        raise BadInput(f"{given}: {told}{meant(str(name), shipped)}; allowed: {allowed}")
+        raise BadInput(f"{given}: {told}{did_you_mean(str(name), shipped)}; allowed: {allowed}")
     return name, table
 
 
@@ -168,7 +168,9 @@ def read_toml(given: str, missing: str, allowed: str, known: Iterable[str] = ())
         text = _text(Path(given))
         return tomllib.loads(text)
     except FileNotFoundError:
-        raise BadInput(f"{missing} {given!r}{meant(given, known)}; allowed: {allowed}") from None
+        raise BadInput(
+            f"{missing} {given!r}{did_you_mean(given, known)}; allowed: {allowed}"
+        ) from None
     except OSError as error:
         raise BadInput(f"cannot read the case file {given!r}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
@@ -210,7 +212,9 @@ def require_known(kind: type[Parameters], keys: Iterable[str], origins: Mapping[
     for key in keys:
         if key not in kind.model_fields:
             near = (
-                f" ({kind.words[key.lower()]})" if key.lower() in kind.words else meant(key, known)
+                f" ({kind.words[key.lower()]})"
+                if key.lower() in kind.words
+                else did_you_mean(key, known)
             )
             told = f"{origins[key]}: unknown key {shortened(key)!r}{near}"
             raise BadInput(f"{told}; allowed: what `softehl keys` lists")

@@ -16,7 +16,7 @@ from scipy.stats import qmc
 
 from softehl.cases.harness.errors import BadInput
 from softehl.runtime.arrays import Array
-from softehl.runtime.suggestions import meant
+from softehl.runtime.suggestions import did_you_mean
 
 F = TypeVar("F", bound="Form")
 Points: TypeAlias = list[dict[str, Any]]
@@ -71,7 +71,7 @@ def table_of(kind: type[F], given: object, where: str) -> F:
         raise BadInput(f"{where} = {given!r}: allowed: a table of {', '.join(names)}")
     for name in given:
         if name not in names:
-            hint = meant(name, names)
+            hint = did_you_mean(name, names)
             raise BadInput(f"{where}: unknown {name!r}{hint}; allowed: {', '.join(names)}")
     try:
         return kind(**given)

@@ -34,7 +34,7 @@ from softehl.cases.paper.states import ENDED, Request, Store, merged
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.run_plan import rod_speeds, strokes_of
 from softehl.runtime.io import read_json, write_csv, write_text
-from softehl.runtime.suggestions import meant
+from softehl.runtime.suggestions import did_you_mean
 
 
 def compute(requests: Sequence[Request], store: Store, *, resume: bool, jobs: int) -> None:
@@ -158,7 +158,7 @@ def chosen(names: Sequence[str]) -> list[Item]:
     """The items of these names, all of them if there are none.  Raises BadInput."""
     for name in names:
         if name not in ITEMS:
-            hint = meant(name, ITEMS)
+            hint = did_you_mean(name, ITEMS)
             raise BadInput(f"no table or figure {name!r}{hint}; allowed: {', '.join(ITEMS)}")
     return [ITEMS[name] for name in dict.fromkeys(names or ITEMS)]
 

@@ -14,9 +14,9 @@ from softehl.runtime.analyses.load_stepping import LOAD_FACTOR, LoadHistory
 from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.definition.argument_checks import finite, function
-from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.loads import Tie
-from softehl.runtime.equations.rigid_body_modes import require_held
+from softehl.runtime.equations.rigid_body_modes import require_supported
 from softehl.runtime.equations.system import System
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.arclength import Arclength
@@ -48,16 +48,16 @@ class LoadPath:
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        ends = [result.t for result in (*self.results[:1], *self.results[-1:])]
+        bounds = [result.t for result in (*self.results[:1], *self.results[-1:])]
         return (
             f"<LoadPath: {len(self.results)} results, {LOAD_FACTOR} "
-            f"{' to '.join(f'{t:.6g}' for t in ends)}; {len(self.limits)} limits, "
+            f"{' to '.join(f'{t:.6g}' for t in bounds)}; {len(self.limits)} limits, "
             f"{len(self.bifurcations)} bifurcations>"
         )
 
 
 def follow(
-    definition: Statement,
+    definition: ProblemDefinition,
     *,
     step: float,
     until: Callable[[Result], bool],
@@ -94,16 +94,16 @@ def follow(
             leave = np.append(other_branch.mode.x, 0.0)
         detector = Detector(system, newton, skip=leave is not None)
 
-        def ends(branch: Branch) -> bool:
+        def path_ends(branch: Branch) -> bool:
             if detect is not None:
                 detector.look(history.results, branch)
             return until(history.results[-1])
 
         branch = arclength.follow(
-            history.problem_at, initial.t, x, until=ends, leave=leave, on_point=history.commit
+            history.problem_at, initial.t, x, until=path_ends, leave=leave, on_point=history.commit
         )
         history.require_end(branch)
-        return LoadPath((*history.results,), branch.limit_points, (*detector.found,))
+        return LoadPath((*history.results,), branch.limit_points, (*detector.bifurcations,))
 
 
 def _scaled_by_response(
@@ -116,7 +116,7 @@ def _scaled_by_response(
     system, first_step = history.system, SupportCheck(newton)
     problem = history.problem_at(initial.t)
     with np.errstate(all="ignore"):
-        require_held(system, problem, initial.x)
+        require_supported(system, problem, initial.x)
         first = first_step.newton.solve(problem, initial.x)
     if not first.converged:
         raise NotConverged(first)

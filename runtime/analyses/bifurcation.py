@@ -84,17 +84,17 @@ class Detector:
     system: System
     newton: Newton
     skip: bool = False
-    found: list[Bifurcation] = field(default_factory=list)
+    bifurcations: list[Bifurcation] = field(default_factory=list)
     folds: int = 0
     blind: bool = False
 
     def look(self, results: Sequence[Result], branch: Branch) -> None:
         """Look for a bifurcation between the last two results."""
         folds, self.folds = len(branch.limit_points) - self.folds, len(branch.limit_points)
-        before, after = results[-2:]
+        previous, after = results[-2:]
         if self.skip and len(results) == 2:
             return
-        if before.unstable is None or after.unstable is None:
+        if previous.unstable is None or after.unstable is None:
             if not self.blind:
                 self.blind = True
                 warn(
@@ -104,53 +104,57 @@ class Detector:
                     stacklevel=2,
                 )
             return
-        change = after.unstable - before.unstable
+        change = after.unstable - previous.unstable
         if change and not (folds == 1 and abs(change) == 1):
-            self.found.append(self._locate(before, after, abs(change)))
+            self.bifurcations.append(self._locate(previous, after, abs(change)))
 
-    def _locate(self, before: Result, after: Result, directions: int) -> Bifurcation:
+    def _locate(self, previous: Result, after: Result, directions: int) -> Bifurcation:
         """By the secant of the eigenvalue next to zero, over the load factor (Illinois)."""
-        a, b = (place(r.problem, r.t, r.point.solution.x) for r in (before, after))
-        near, located = min(a, b, key=lambda end: abs(end.value)), False
+        a, b = (critical_point(r.problem, r.t, r.point.solution.x) for r in (previous, after))
+        nearest, located = min(a, b, key=lambda end: abs(end.value)), False
         low, high = a.value, b.value
         for _ in range(_SEARCHES):
             if low * high >= 0.0 or a.t == b.t:
                 break
             share = low / (low - high)
             t = a.t + share * (b.t - a.t)
-            old, histories = before.point.solution.x, before.histories
-            problem = self.system.problem(self.system.still(t, old, histories))
+            old, histories = previous.point.solution.x, previous.histories
+            problem = self.system.problem(self.system.quasi_static_step(t, old, histories))
             with np.errstate(all="ignore"):
                 solution = self.newton.solve(problem, a.x + share * (b.x - a.x))
             if not solution.converged:
                 break
-            moved = abs(t - near.t)
-            near = place(problem, t, solution.x)
-            located = moved <= _LOCATED * max(abs(t), abs(after.t - before.t))
-            if located or near.value == 0.0:
+            moved = abs(t - nearest.t)
+            nearest = critical_point(problem, t, solution.x)
+            located = moved <= _LOCATED * max(abs(t), abs(after.t - previous.t))
+            if located or nearest.value == 0.0:
                 located = True
                 break
-            if near.value * high < 0.0:
+            if nearest.value * high < 0.0:
                 a, low = b, high
             else:
                 low *= 0.5
-            b, high = near, near.value
-        return self._told(before, near, directions, located=located)
+            b, high = nearest, nearest.value
+        return self._bifurcation(previous, nearest, directions, located=located)
 
-    def _told(self, before: Result, near: Place, directions: int, *, located: bool) -> Bifurcation:
-        old, histories = before.point.solution.x, before.histories
-        problem = self.system.problem(self.system.still(near.t, old, histories)).at(near.x)
-        solution = replace(before.point.solution, x=near.x)
-        state = Result(self.system, problem, Point(near.t, solution), before.histories)
-        mode = near.mode / np.abs(displacements(self.system, near.mode)).max()
+    def _bifurcation(
+        self, previous: Result, critical: Place, directions: int, *, located: bool
+    ) -> Bifurcation:
+        old, histories = previous.point.solution.x, previous.histories
+        problem = self.system.problem(self.system.quasi_static_step(critical.t, old, histories)).at(
+            critical.x
+        )
+        solution = replace(previous.point.solution, x=critical.x)
+        state = Result(self.system, problem, Point(critical.t, solution), previous.histories)
+        mode = critical.mode / np.abs(displacements(self.system, critical.mode)).max()
         return Bifurcation(state, ModeShape.of(state, mode), directions, located)
 
 
-def place(problem: Problem, t: float, x: Array) -> Place:
+def critical_point(problem: Problem, t: float, x: Array) -> Place:
     """Of a problem at unknowns x, (n,), with the contacts that it has there."""
-    here = problem.at(x)
-    K = here.assembler.linearise(x, here.parameters)[1]
-    free = Constraints.of(here, K)
+    contact_problem = problem.at(x)
+    K = contact_problem.assembler.linearise(x, contact_problem.parameters)[1]
+    free = Constraints.of(contact_problem, K)
     value, mode = nearest_zero(symmetric(free.matrix(K)))
     return Place(t, x, value, free.map @ mode)
 

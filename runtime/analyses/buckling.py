@@ -12,17 +12,17 @@ from scipy.sparse import csc_array
 from softehl.runtime.analyses.initial_state import initial_state
 from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.arrays import Array, read_only
-from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.eigenproblems import SymmetricTangent, require_count
-from softehl.runtime.equations.rigid_body_modes import require_held
+from softehl.runtime.equations.rigid_body_modes import require_supported
 from softehl.runtime.equations.system import System
 from softehl.runtime.results.result import ModeShape, Result
 from softehl.runtime.solve.eigen import NoModes
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
-from softehl.runtime.suggestions import few
+from softehl.runtime.suggestions import short_list
 
 _LENGTH = 1e-4
 """Of the size of the mesh: how far the difference of tangents of `buckling` goes. Its error is
@@ -46,11 +46,11 @@ class Buckling:
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        return f"<Buckling: factors {few(f'{f:.6g}' for f in self.factors)}>"
+        return f"<Buckling: factors {short_list(f'{f:.6g}' for f in self.factors)}>"
 
 
 def buckling(
-    definition: Statement,
+    definition: ProblemDefinition,
     count: int = 1,
     *,
     start: Result | None = None,
@@ -62,11 +62,11 @@ def buckling(
     initial = initial_state(system, start)
 
     def problem_at(factor: float) -> Problem:
-        return system.problem(system.still(factor, initial.x, initial.histories))
+        return system.problem(system.quasi_static_step(factor, initial.x, initial.histories))
 
     with np.errstate(all="ignore"):
         problem = problem_at(initial.t)
-        require_held(system, problem, initial.x)
+        require_supported(system, problem, initial.x)
         solution = newton.solve(problem, initial.x)
     if not solution.converged:
         raise NotConverged(solution)
@@ -86,24 +86,24 @@ def _buckling_modes(
     The tangent K changes by K' along the linear response to a load that grows by 1:
     (K + (f - t) K') mode = 0.
     """
-    words = f"buckling({count})"
-    require_count(words, count)
+    context = f"buckling({count})"
+    require_count(context, count)
     comm, t, x = system.comm, state.parameter, state.solution.x
-    here = SymmetricTangent.at(system, problem_at(t), x, words)
+    tangent = SymmetricTangent.at(system, problem_at(t), x, context)
     r, K = problem_at(t + 1.0).linearise(x)
     try:
         response = -newton.linear.factorise(K).solve(r)
     except SingularMatrix as error:
-        raise StudyError(f"{words}: {error}") from None
-    most = comm.max(float(np.abs(response).max(initial=0.0)))
-    if not most > 0.0:
-        raise StudyError(f"{words}: nothing changes with the load factor; give loads or fix(...)")
-    h = _LENGTH * comm.max(float(np.ptp(system.mesh.points, axis=0).max())) / most
-    ahead = SymmetricTangent.at(system, problem_at(t + h), x + h * response, words).K
-    behind = SymmetricTangent.at(system, problem_at(t - h), x - h * response, words).K
-    change = csc_array((ahead - behind) / (2.0 * h))
+        raise StudyError(f"{context}: {error}") from None
+    largest = comm.max(float(np.abs(response).max(initial=0.0)))
+    if not largest > 0.0:
+        raise StudyError(f"{context}: nothing changes with the load factor; give loads or fix(...)")
+    h = _LENGTH * comm.max(float(np.ptp(system.mesh.points, axis=0).max())) / largest
+    ahead = SymmetricTangent.at(system, problem_at(t + h), x + h * response, context).K
+    backward = SymmetricTangent.at(system, problem_at(t - h), x - h * response, context).K
+    change = csc_array((ahead - backward) / (2.0 * h))
     try:
-        factors, found = comm.buckling(here.problem, here.K, change, count)
+        factors, modes = comm.buckling(tangent.problem, tangent.K, change, count)
     except (NoModes, SingularMatrix) as error:
-        raise StudyError(f"{words}: {error}") from None
-    return t + factors, found
+        raise StudyError(f"{context}: {error}") from None
+    return t + factors, modes

@@ -78,8 +78,8 @@ class Progress:
     """Progress line on the terminal; a line for each step elsewhere, and in the log.
 
     name: of what grows, such as "load factor", from `begin` to `until` (None: unknown). inplace:
-    rewrite the one line. note: returns words for the end of the line. shown: on stderr; else steps
-    are in the log alone.
+    rewrite the one line. note: returns words for the end of the line. visible: on stderr; else
+    steps are in the log alone.
     """
 
     name: str
@@ -87,30 +87,30 @@ class Progress:
     until: float | None
     inplace: bool
     note: Callable[[], str] = str
-    shown: bool = True
+    visible: bool = True
     steps: int = 0
     since: float = field(default_factory=time.monotonic)
 
     @classmethod
     def on_stderr(
         cls,
-        shown: bool | None,
+        visible: bool | None,
         name: str,
         begin: float,
         until: float | None,
         *,
         note: Callable[[], str],
     ) -> Progress:
-        """Return progress on stderr; shown: None if that is a terminal."""
+        """Return progress on stderr; visible: None if that is a terminal."""
         terminal = sys.stderr.isatty()
-        return cls(name, begin, until, terminal, note, terminal if shown is None else shown)
+        return cls(name, begin, until, terminal, note, terminal if visible is None else visible)
 
     def __call__(self, result: Result) -> None:
         """Report one more step."""
         if not self.steps and result.t == self.begin:
             return  # where the path begins
         self.steps += 1
-        if not (self.shown or LOG.isEnabledFor(logging.INFO)):
+        if not (self.visible or LOG.isEnabledFor(logging.INFO)):
             return
         end = "" if self.until is None else f" of {self.until:g}"
         note = self.note()
@@ -119,14 +119,14 @@ class Progress:
             f"{time.monotonic() - self.since:.1f} s{f' ({note})' if note else ''}"
         )
         LOG.info(text)
-        if not self.shown:
+        if not self.visible:
             return
         sys.stderr.write(f"\r\x1b[K{text}" if self.inplace else f"{text}\n")
         sys.stderr.flush()
 
     def close(self) -> None:
         """End the line."""
-        if self.shown and self.inplace and self.steps:
+        if self.visible and self.inplace and self.steps:
             sys.stderr.write("\n")
 
 

@@ -28,8 +28,8 @@ from softehl.runtime.analyses.time_integrators import (
     step_before_end,
 )
 from softehl.runtime.arrays import Array
-from softehl.runtime.definition.argument_checks import datum, known
-from softehl.runtime.definition.problem_definition import Datum, Statement, StudyError
+from softehl.runtime.definition.argument_checks import datum, require_names
+from softehl.runtime.definition.problem_definition import Datum, ProblemDefinition, StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.system import Step, System
@@ -55,7 +55,7 @@ the square of that, relative to what accelerations do. At 0.1 a slow load on a s
 
 
 def march_with_inertia(
-    definition: Statement,
+    definition: ProblemDefinition,
     integrator: SecondOrderIntegrator | CentralDifference,
     *,
     dt: float,
@@ -89,16 +89,16 @@ def march_with_inertia(
     return prepared.callbacks("t", initial.t, until).around(motions)
 
 
-def _initial_velocities(system: System, start: Result | None, given: Mapping[str, Datum]) -> Array:
+def _initial_velocities(system: System, start: Result | None, values: Mapping[str, Datum]) -> Array:
     """Velocities at the start, (n,): those of `start`, and those that are given."""
     v, nodal = np.zeros(system.size), system.numbering.nodal
     if isinstance(start, Motion):
         v = _nodal_rates(system, start, start.velocity)
-    known("unknown", given, nodal, "velocity")
+    require_names("unknown", values, nodal, "velocity")
     for name, dofs in nodal.items():
         mask = dofs >= 0
-        if name in given:
-            v[dofs[mask]] = datum("velocity", name, given[name], system.mesh.points[mask])
+        if name in values:
+            v[dofs[mask]] = datum("velocity", name, values[name], system.mesh.points[mask])
     return v
 
 
@@ -140,7 +140,9 @@ def _continued(
 def _with_supports(body: Body, state: MotionState, problem: Problem, dt: float) -> MotionState:
     """The state with prescribed values and their velocities; massless unknowns have none."""
     x, v, step = problem.admissible(state.x), state.v.copy(), _SUPPORT_STEP * dt
-    later = body.plain.part(Step(state.t + step, 1.0, x, 0.0, state.v, dt, state.histories))
+    later = body.plain.local_problem(
+        Step(state.t + step, 1.0, x, 0.0, state.v, dt, state.histories)
+    )
     v[problem.fixed] = (later.values - problem.values) / step
     v[~body.heavy] = 0.0
     return replace(state, x=x, v=v)
@@ -212,9 +214,9 @@ def _implicit_step(
     step = replace(
         state.step(state.t + dt),
         rate=velocity.c,
-        rest=velocity.rest,
+        rate_offset=velocity.constant,
         acceleration=acceleration.c,
-        remainder=acceleration.rest,
+        acceleration_offset=acceleration.constant,
     )
     return step, velocity
 
@@ -309,7 +311,7 @@ class _ImplicitStepper(Stepper):
         assert self.forces is not None
         middle = None
         if integrator.averages_forces:
-            without_inertia = replace(step, acceleration=0.0, remainder=None)
+            without_inertia = replace(step, acceleration=0.0, acceleration_offset=None)
             middle = body.problem(without_inertia, integrator.load_time, 0.0 * x)
             mean = Forces.of(middle, x, body.roles)
             supports = _at_supports(end, mean.total + body.M @ acceleration)
@@ -340,7 +342,7 @@ class _ImplicitStepper(Stepper):
         kinetic = 0.5 * float(v @ (self.body.M @ v))
         stored = stored_energy(end, x, self.body.roles)
         assert self.forces is not None
-        return self.ledger.told(self.state.t, kinetic, stored, self.forces, x)
+        return self.ledger.balance(self.state.t, kinetic, stored, self.forces, x)
 
     def _motion(self, end: Problem, state: MotionState, solution: Solution) -> Motion:
         return Motion(
@@ -358,6 +360,6 @@ class _ImplicitStepper(Stepper):
 
 def _at_supports(problem: Problem, forces: Array) -> Array:
     """Forces (n,) of supports: those on prescribed unknowns."""
-    found = np.zeros_like(forces)
-    found[problem.fixed] = forces[problem.fixed]
-    return found
+    reactions = np.zeros_like(forces)
+    reactions[problem.fixed] = forces[problem.fixed]
+    return reactions

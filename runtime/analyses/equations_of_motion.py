@@ -28,7 +28,7 @@ from softehl.runtime.equations.contact_setup import weighted
 from softehl.runtime.equations.mass_matrix import Masses, mass_blocks, mass_matrix
 from softehl.runtime.equations.system import Step, System
 from softehl.runtime.solve.linear.krylov import conjugate_gradients
-from softehl.runtime.suggestions import listed
+from softehl.runtime.suggestions import join_names
 
 _BEFORE = "forces of the step before"
 _EXACT, _MOST = 1e-14, 1000  # of accelerations at the start; the mass is well conditioned
@@ -43,13 +43,13 @@ class _Known:
     parameters: tuple[str, ...] = ()
     fields: tuple[str, ...] = ()
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
-        return np.asarray(given["data"])
+    def residual(self, coordinates: Array, dofs: Array, **kernel_data: Any) -> Array:
+        return np.asarray(kernel_data["data"])
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
-        return np.asarray(given["data"]), np.zeros((len(dofs), 1, 1))
+    def tangent(self, coordinates: Array, dofs: Array, **kernel_data: Any) -> tuple[Array, Array]:
+        return np.asarray(kernel_data["data"]), np.zeros((len(dofs), 1, 1))
 
-    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def fields_at(self, coordinates: Array, dofs: Array, **kernel_data: Any) -> Array:
         return np.empty((len(dofs), 0, 0))
 
 
@@ -65,25 +65,25 @@ class _Scaled:
             raise AttributeError(name)
         return getattr(self.kernel, name)
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **arguments: Any) -> Array:
         """Residuals (n, ndof)."""
-        own, factors = self._parted(dofs, given)
-        return np.asarray(factors * self.kernel.residual(coordinates, dofs, **own))
+        inner_arguments, factors = self._parted(dofs, arguments)
+        return np.asarray(factors * self.kernel.residual(coordinates, dofs, **inner_arguments))
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **arguments: Any) -> tuple[Array, Array]:
         """Residuals and tangents (n, ndof, ndof)."""
-        own, factors = self._parted(dofs, given)
-        r, K = self.kernel.tangent(coordinates, dofs, **own)
+        inner_arguments, factors = self._parted(dofs, arguments)
+        r, K = self.kernel.tangent(coordinates, dofs, **inner_arguments)
         return factors * r, factors[:, :, None] * K
 
-    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def fields_at(self, coordinates: Array, dofs: Array, **arguments: Any) -> Array:
         """None, (n, 0, 0)."""
         return np.empty((len(dofs), 0, 0))
 
-    def _parted(self, dofs: Array, given: dict[str, Any]) -> tuple[dict[str, Any], Array]:
-        own, factors = np.split(given["data"], [-dofs.shape[1]], axis=1)
-        data = np.ascontiguousarray(own) if own.shape[1] else None
-        return {**given, "data": data}, factors
+    def _parted(self, dofs: Array, arguments: dict[str, Any]) -> tuple[dict[str, Any], Array]:
+        inner_data, factors = np.split(arguments["data"], [-dofs.shape[1]], axis=1)
+        data = np.ascontiguousarray(inner_data) if inner_data.shape[1] else None
+        return {**arguments, "data": data}, factors
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,7 @@ class Body:
         cls, system: System, mass: Masses | None, integrator: SecondOrderIntegrator | None, at: Step
     ) -> Body:
         """Raises StudyError where there is no mass, or where a rate belongs to none."""
-        problem, blocks = system.part(at), mass_blocks(system, mass)
+        problem, blocks = system.local_problem(at), mass_blocks(system, mass)
         comm, M = system.comm, mass_matrix(system, problem, at.old, mass)
         heavy = comm.sum_shared(M.diagonal()) > 0.0
         for block in system.blocks.values():
@@ -131,12 +131,12 @@ class Body:
             Roles.in_system(system),
             1.0 if integrator is None else integrator.final_weight,
         )
-        own = list(system.assembler.blocks)
+        element_blocks = list(system.assembler.blocks)
         massless = _multipliers(system, problem, at.old, heavy, roles)
         if integrator is not None and integrator.averages_forces:
-            free = [b for b in own if roles.of[b.name] not in ("tie", "contact")]
+            free = [b for b in element_blocks if roles.of[b.name] not in ("tie", "contact")]
             changed = {b.name: _averaged(b, system.blocks.get(b.name), massless) for b in free}
-            own = [changed.get(b.name, b) for b in own]
+            element_blocks = [changed.get(b.name, b) for b in element_blocks]
         elif integrator is not None and not integrator.damps and comm.max(float(massless.any())):
             raise StudyError(
                 f"{_name_of(system, massless)} is a multiplier, whose error grows in steps of "
@@ -144,14 +144,19 @@ class Body:
                 '"generalised-alpha" with rho_inf below 1, or "midpoint"'
             )
         contacts, stiffer = weighted(system, 1.0 / weight)
-        own = [stiffer.get(b.name, b) for b in own]
+        element_blocks = [stiffer.get(b.name, b) for b in element_blocks]
         factors = np.ones(system.size)
         factors[roles.bound[~heavy[roles.bound]]] = 1.0 / weight
-        own = [b if roles.of[b.name] in ("tie", "contact") else _scaled(b, factors) for b in own]
+        element_blocks = [
+            b if roles.of[b.name] in ("tie", "contact") else _scaled(b, factors)
+            for b in element_blocks
+        ]
         rows = comm.owned(system.size)
         rows = rows[heavy[rows]][:, None]
-        before = ElementBlock(_BEFORE, _Known(), np.empty((0, 0)), rows, check_orientation=False)
-        assembler = Assembler.build(system.size, [*own, *blocks, before])
+        force_block = ElementBlock(
+            _BEFORE, _Known(), np.empty((0, 0)), rows, check_orientation=False
+        )
+        assembler = Assembler.build(system.size, [*element_blocks, *blocks, force_block])
         lumps = _lumped(system, M, blocks) if integrator is None else M.diagonal()
         moving = replace(
             system, assembler=assembler, contacts=contacts, comm=comm.with_other_elements()
@@ -165,31 +170,35 @@ class Body:
         """Distribution of its unknowns over processes."""
         return self.plain.comm
 
-    def problem(self, step: Step, place: float, before: Array) -> Problem:
+    def problem(self, step: Step, load_time: float, initial_forces: Array) -> Problem:
         """Equations of a step that ends at step.t: loads of a place in it, supports of its end.
 
-        before: (n,) forces that are added where there is mass.
+        initial_forces: (n,) forces that are added where there is mass.
         """
-        before = self.comm.sum_shared(before)
-        problem = self.moving.part(replace(step, t=step.t - (1.0 - place) * step.dt))
-        end = problem if place == 1.0 else self.plain.part(step)
-        remainder = np.zeros(len(before)) if step.remainder is None else step.remainder
+        initial_forces = self.comm.sum_shared(initial_forces)
+        problem = self.moving.local_problem(replace(step, t=step.t - (1.0 - load_time) * step.dt))
+        end = problem if load_time == 1.0 else self.plain.local_problem(step)
+        remainder = (
+            np.zeros(len(initial_forces))
+            if step.acceleration_offset is None
+            else step.acceleration_offset
+        )
         blocks, parameters = [], dict(problem.parameters)
         for block in problem.assembler.blocks:
-            known = block
+            changed = block
             if isinstance(block.kernel, DiscreteGradientKernel):
-                known = with_old(block, step.old)
+                changed = with_old(block, step.old)
             elif isinstance(block.kernel, MassKernel):
-                known = replace(block, data=np.ascontiguousarray(remainder[block.dofs]))
+                changed = replace(block, data=np.ascontiguousarray(remainder[block.dofs]))
             elif isinstance(block.kernel, _Known):
-                known = replace(block, data=before[block.dofs])
+                changed = replace(block, data=initial_forces[block.dofs])
             elif isinstance(block.kernel, Tie):
                 parameters[block.name] = end.parameters[block.name]
             if isinstance(block.kernel, _Scaled):
                 columns = self.factors[block.dofs]
                 data = [columns] if block.data is None else [block.data, columns]
-                known = replace(block, data=np.ascontiguousarray(np.concatenate(data, axis=1)))
-            blocks.append(known)
+                changed = replace(block, data=np.ascontiguousarray(np.concatenate(data, axis=1)))
+            blocks.append(changed)
         assembler = replace(problem.assembler, blocks=tuple(blocks))
         return replace(
             problem,
@@ -207,19 +216,19 @@ class Body:
 
     def fastest(self, at: Step) -> float:
         """Highest angular frequency of the mesh, estimated by the diagonals of the tangent."""
-        problem = self.plain.part(at)
+        problem = self.plain.local_problem(at)
         with np.errstate(all="ignore"):
             K = problem.assembler.linearise(at.old, problem.parameters)[1]
         stiff, mass = (self.comm.sum_shared(A.diagonal()) for A in (K, self.M))
-        known = (mass > 0.0) & np.isfinite(stiff)
-        ratio = float((np.abs(stiff[known]) / mass[known]).max(initial=0.0))
+        has_mass = (mass > 0.0) & np.isfinite(stiff)
+        ratio = float((np.abs(stiff[has_mass]) / mass[has_mass]).max(initial=0.0))
         return float(np.sqrt(max(self.comm.max(ratio), np.finfo(np.float64).tiny)))
 
     def weighted(self, x: Array, weight: float) -> Array:
         """Unknowns (n,) with those of ties and contacts times a number."""
-        found = x.copy()
-        found[self.roles.multipliers] *= weight
-        return found
+        scaled = x.copy()
+        scaled[self.roles.multipliers] *= weight
+        return scaled
 
     def friction(self, problem: Problem, x: Array, moved: Array) -> float:
         """Work of friction at the end x of a step in which the unknowns moved (n,)."""
@@ -228,12 +237,14 @@ class Body:
         assert isinstance(problem, ContactProblem)
         smooth = tuple(replace(c, friction=0.0) for c in self.plain.contacts)  # type: ignore[type-var]
         other = replace(problem, contacts=smooth, latest=[])
-        whole, normal = (Forces.of(p, x, self.roles).contact for p in (problem, other))
-        return float((whole - normal) @ moved)
+        total, normal = (Forces.of(p, x, self.roles).contact for p in (problem, other))
+        return float((total - normal) @ moved)
 
     def at_end(self, step: Step, v: Array) -> Problem:
         """The plain equations at the end of a step, with velocities v, (n,)."""
-        return self.plain.part(replace(step, rate=0.0, rest=v, acceleration=0.0, remainder=None))
+        return self.plain.local_problem(
+            replace(step, rate=0.0, rate_offset=v, acceleration=0.0, acceleration_offset=None)
+        )
 
     def started(self, problem: Problem, x: Array) -> Array:
         """Accelerations (n,) at the start x: M a = -f on what is free.  Raises StudyError."""
@@ -241,19 +252,19 @@ class Body:
         free = self.comm.constraint_map(problem)
         diagonal = free.gather(self.M.diagonal())
         inverse = 1.0 / np.where(diagonal > 0.0, diagonal, np.inf)
-        found = conjugate_gradients(
+        solution = conjugate_gradients(
             lambda z: free.gather(self.M @ free.spread(z)),
             lambda r: inverse * r,
             np.where(diagonal > 0.0, -free.gather(forces.total + forces.constraints), 0.0),
             *(_EXACT, _MOST, self.comm.dot),
         )
-        if not found.converged:
+        if not solution.converged:
             raise StudyError("the mass is not positive: no accelerations at the start are found")
-        return free.spread(found.x)
+        return free.spread(solution.x)
 
     def masked(self, values: Affine) -> Affine:
         """Zero in unknowns without mass, for their velocities and accelerations."""
-        return Affine(values.c, np.where(self.heavy, values.rest, 0.0))
+        return Affine(values.c, np.where(self.heavy, values.constant, 0.0))
 
 
 def _scaled(block: ElementBlock, factors: Array) -> ElementBlock:
@@ -269,18 +280,18 @@ def _multipliers(system: System, problem: Problem, x: Array, heavy: Flags, roles
     massless[problem.fixed] = massless[roles.multipliers] = False
     if not system.comm.max(float(massless.any())):
         return massless
-    here = problem.at(x)
+    contact_problem = problem.at(x)
     with np.errstate(all="ignore"):
-        K = here.assembler.linearise(x, here.parameters)[1]
+        K = contact_problem.assembler.linearise(x, contact_problem.parameters)[1]
     among = system.comm.sum_shared(np.asarray(abs(K) @ massless.astype(np.float64)))
-    found: Flags = massless & (among == 0.0)
-    return found
+    multipliers: Flags = massless & (among == 0.0)
+    return multipliers
 
 
 def _name_of(system: System, numbers: Flags) -> str:
     """Names of the unknowns among these, (n,)."""
     layout = system.numbering.layout
-    return listed([repr(name) for name in layout.names if numbers[layout.part(name)].any()])
+    return join_names([repr(name) for name in layout.names if numbers[layout.part(name)].any()])
 
 
 def _averaged(block: ElementBlock, page: Block | None, multipliers: Flags) -> ElementBlock:
@@ -303,22 +314,24 @@ def _averaged(block: ElementBlock, page: Block | None, multipliers: Flags) -> El
 
 def _lumped(system: System, M: csc_array, blocks: list[ElementBlock]) -> Array:
     """Masses (n,) at the nodes: of densities cell by cell, of pages unknown by unknown."""
-    found, consistent = np.zeros(system.size), np.zeros(system.size)
+    lumps, consistent = np.zeros(system.size), np.zeros(system.size)
     for block in blocks:
         assert isinstance(block.kernel, MassKernel)
         m, components = block.kernel.matrices, block.kernel.components
-        np.add.at(found, block.dofs, np.tile(lumped(m), (1, components)))
+        np.add.at(lumps, block.dofs, np.tile(lumped(m), (1, components)))
         np.add.at(consistent, block.dofs, np.tile(np.einsum("naa->na", m), (1, components)))
-    comm, rest = system.comm, M.diagonal() - consistent
-    most = comm.max(float(np.abs(M.diagonal()).max(initial=0.0)))
-    if comm.max(float(np.abs(rest).max(initial=0.0))) <= 1e-12 * most:
-        return found
+    comm, page_mass = system.comm, M.diagonal() - consistent
+    largest = comm.max(float(np.abs(M.diagonal()).max(initial=0.0)))
+    if comm.max(float(np.abs(page_mass).max(initial=0.0))) <= 1e-12 * largest:
+        return lumps
     total = np.asarray(M.sum(axis=1)).ravel()
     if blocks:
         raise StudyError("explicit: give all masses as mass=..., or all in pages, not both")
     for name in system.numbering.layout.names:
         part = system.numbering.layout.part(name)
-        whole, known = comm.sum(np.array([total[part].sum(), rest[part].sum()])).tolist()
-        if known:
-            found[part] = rest[part] * whole / known
-    return found
+        row_sum, diagonal_sum = comm.sum(
+            np.array([total[part].sum(), page_mass[part].sum()])
+        ).tolist()
+        if diagonal_sum:
+            lumps[part] = page_mass[part] * row_sum / diagonal_sum
+    return lumps

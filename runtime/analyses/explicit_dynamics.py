@@ -41,7 +41,7 @@ class ExplicitMarch:
 
     dt: float
     body: Body
-    here: MotionState
+    state: MotionState
     free: ConstraintMap
     masses: Array
     integrator: CentralDifference
@@ -56,52 +56,52 @@ class ExplicitMarch:
         free = body.comm.constraint_map(problem)
         march = cls(dt, body, state, free, free.gather(body.lumps), integrator)
         a = march._accelerations(Forces.of(problem, state.x, body.roles).total)
-        march.here = replace(state, a=a)
+        march.state = replace(state, a=a)
         return march
 
     def run(self, until: float) -> Iterator[Motion]:
         """Results every dt until the end.  Raises StudyError, NotConverged."""
         ledger = Ledger(self.body.comm)
-        begin = self.body.at_end(self.here.ended_step(self.dt), self.here.v)
-        self._told(begin, ledger)
+        begin = self.body.at_end(self.state.ended_step(self.dt), self.state.v)
+        self._energies(begin, ledger)
         end, stable = begin, self._stable(begin)
-        count = max(int(np.ceil((until - self.here.t) / self.dt * (1.0 - ROUNDING))), 1)
-        first = self.here.t
+        count = max(int(np.ceil((until - self.state.t) / self.dt * (1.0 - ROUNDING))), 1)
+        first = self.state.t
         for k in range(1, count + 1):
             t = min(first + k * self.dt, until)
-            steps = int(np.ceil((t - self.here.t) / (SAFE * stable)))
-            for goal in np.linspace(self.here.t, t, steps + 1)[1:]:
+            steps = int(np.ceil((t - self.state.t) / (SAFE * stable)))
+            for goal in np.linspace(self.state.t, t, steps + 1)[1:]:
                 end = self._step(end, float(goal), ledger)
             stable = self._stable(end)
             yield self._motion(end, ledger, steps, stable)
 
-    def _step(self, before: Problem, t: float, ledger: Ledger) -> Problem:
+    def _step(self, initial_equations: Problem, t: float, ledger: Ledger) -> Problem:
         """Velocity Verlet: the equations at the end of a step."""
-        here, body = self.here, self.body
-        dt = t - here.t
-        half = self.integrator.half_step(dt, here.v, here.a)
-        x = here.x + dt * half
-        end = body.at_end(here.step(t), half)
+        initial, body = self.state, self.body
+        dt = t - initial.t
+        half = self.integrator.half_step(dt, initial.v, initial.a)
+        x = initial.x + dt * half
+        end = body.at_end(initial.step(t), half)
         x[end.fixed] = end.values
-        half[end.fixed] = (x - here.x)[end.fixed] / dt
+        half[end.fixed] = (x - initial.x)[end.fixed] / dt
         forces = Forces.of(end, x, body.roles)
         if self.body.comm.max(float(not np.isfinite(forces.total).all())):
             where = body.comm.distribute(end).where_not_finite(x)
-            words = f"t = {t:.6g}: the forces are not finite{where}"
-            state = Solution(here.x, Status.NOT_FINITE, words, (), 0, 0)
-            raise NotConverged(Branch((Point(here.t, state),), Status.NOT_FINITE, words))
+            message = f"t = {t:.6g}: the forces are not finite{where}"
+            state = Solution(initial.x, Status.NOT_FINITE, message, (), 0, 0)
+            raise NotConverged(Branch((Point(initial.t, state),), Status.NOT_FINITE, message))
         a = self._accelerations(forces.total)
-        moved = x - here.x
-        old = Forces.of(before, here.x, body.roles)
+        moved = x - initial.x
+        old = Forces.of(initial_equations, initial.x, body.roles)
         supports = np.zeros(len(x))
         total = 0.5 * (old.total + forces.total)
-        inertia = self.body.lumps * (half - here.v) / dt
+        inertia = self.body.lumps * (half - initial.v) / dt
         supports[end.fixed] = (total + inertia)[end.fixed]
         ledger.add(old.mean(forces), supports, moved)
-        ledger.external += parameter_work(before, end, body.roles, (here.x, x), None)
+        ledger.external += parameter_work(initial_equations, end, body.roles, (initial.x, x), None)
         v = self.integrator.half_step(dt, half, a)
-        histories = body.plain.committed(end, x, here.histories)
-        self.here = MotionState(t, x, v, a, histories)
+        histories = body.plain.committed(end, x, initial.histories)
+        self.state = MotionState(t, x, v, a, histories)
         return end
 
     def _accelerations(self, forces: Array) -> Array:
@@ -110,7 +110,7 @@ class ExplicitMarch:
 
     def _stable(self, problem: Problem) -> float:
         """2 over the highest frequency about the present state."""
-        K = symmetric(problem.assembler.linearise(self.here.x, problem.parameters)[1])
+        K = symmetric(problem.assembler.linearise(self.state.x, problem.parameters)[1])
         free, root, comm = self.free, 1.0 / np.sqrt(self.masses), self.body.comm
 
         def scaled(z: Array) -> Array:
@@ -118,31 +118,35 @@ class ExplicitMarch:
             return root * free.gather(forces)
 
         begin = np.random.default_rng(comm.rank_and_size[0]).uniform(-1.0, 1.0, len(root))
-        found = highest(scaled, begin, comm.dot, _ACCURATE)
-        return self.integrator.stable_step(found) if found > 0.0 else self.dt / SAFE
+        frequency_squared = highest(scaled, begin, comm.dot, _ACCURATE)
+        return (
+            self.integrator.stable_step(frequency_squared)
+            if frequency_squared > 0.0
+            else self.dt / SAFE
+        )
 
-    def _told(self, end: Problem, ledger: Ledger) -> dict[str, float]:
-        kinetic = 0.5 * float(self.body.lumps @ self.here.v**2)
-        stored = stored_energy(end, self.here.x, self.body.roles)
-        forces = Forces.of(end, self.here.x, self.body.roles)
-        return ledger.told(self.here.t, kinetic, stored, forces, self.here.x)
+    def _energies(self, end: Problem, ledger: Ledger) -> dict[str, float]:
+        kinetic = 0.5 * float(self.body.lumps @ self.state.v**2)
+        stored = stored_energy(end, self.state.x, self.body.roles)
+        forces = Forces.of(end, self.state.x, self.body.roles)
+        return ledger.balance(self.state.t, kinetic, stored, forces, self.state.x)
 
     def _motion(self, end: Problem, ledger: Ledger, steps: int, stable: float) -> Motion:
-        here, size = self.here, float(np.ptp(self.body.plain.mesh.points, axis=0).max())
+        state, size = self.state, float(np.ptp(self.body.plain.mesh.points, axis=0).max())
         for block in end.assembler.blocks:
             if isinstance(block.kernel, Tie):
-                r = block.residual(here.x, end.parameters[block.name])[:, 2]
-                apart = self.body.comm.max(float(np.abs(r).max(initial=0.0)))
-                if apart > _APART * size:
+                r = block.residual(state.x, end.parameters[block.name])[:, 2]
+                opening = self.body.comm.max(float(np.abs(r).max(initial=0.0)))
+                if opening > _APART * size:
                     raise StudyError(
-                        f'{block.name}: opens by {apart:.3g}; method = "explicit" holds '
+                        f'{block.name}: opens by {opening:.3g}; method = "explicit" holds '
                         "ties of a constant offset, on no side of which a support moves"
                     )
-        solution = Solution(here.x, Status.CONVERGED, f"{steps} steps", (), 0, 0)
-        posed = self.body.comm.distribute(end)
+        solution = Solution(state.x, Status.CONVERGED, f"{steps} steps", (), 0, 0)
+        distributed = self.body.comm.distribute(end)
         return Motion(
-            *(self.body.plain, posed, Point(here.t, solution), here.histories),
-            v=here.v, a=here.a, energy=self._told(end, ledger), stable_step=stable,
+            *(self.body.plain, distributed, Point(state.t, solution), state.histories),
+            v=state.v, a=state.a, energy=self._energies(end, ledger), stable_step=stable,
         )  # fmt: skip
 
 

@@ -20,17 +20,17 @@ from scipy.sparse.csgraph import connected_components
 from softehl.runtime.analyses.initial_state import SMALLEST
 from softehl.runtime.arrays import Array, Flags, Integers, count_of
 from softehl.runtime.definition import argument_checks as read
-from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
-from softehl.runtime.equations.system_builder import equations
+from softehl.runtime.equations.system_builder import build_system
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
-from softehl.runtime.suggestions import listed
+from softehl.runtime.suggestions import join_names
 
 Gradient: TypeAlias = "Array | Sequence[Sequence[float | None]]"
 """Mean deformation gradient, (dim, dim); None where the mean stress is zero instead."""
@@ -74,12 +74,12 @@ class Homogenised:
         K = problem.assembler.linearise(self.result.x, problem.parameters)[1]
         T = self.cell.fluctuations
         stiff = K @ modes
-        found = modes.T @ stiff
+        tangent = modes.T @ stiff
         if T.shape[1]:  # else nothing fluctuates: one linear cell
             factors = direct_solver("auto").factorise(csc_array(T.T @ K @ T))
             bent = np.stack([factors.solve(row) for row in np.asarray(T.T @ stiff).T], axis=1)
-            found = found - modes.T @ (K @ (T @ bent))
-        return np.asarray(found).reshape(2 * self.F.shape) / self.cell.volume
+            tangent = tangent - modes.T @ (K @ (T @ bent))
+        return np.asarray(tangent).reshape(2 * self.F.shape) / self.cell.volume
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,12 +143,12 @@ class Cell:
         count = count_of(steps)
         if count is None:
             raise StudyError(f"steps = {steps!r}: a whole number of at least 1 is needed")
-        wanted, free = self._gradient(F)
-        dim = len(wanted)
-        before = np.eye(dim) if start is None else start.F
-        after = np.where(free, before, wanted)
+        target, free = self._gradient(F)
+        dim = len(target)
+        initial = np.eye(dim) if start is None else start.F
+        after = np.where(free, initial, target)
         x0 = self.system.at_rest() if start is None else start.result.x
-        path = _Path(self, free, before, after, x0, self._histories(start))
+        path = _Path(self, free, initial, after, x0, self._histories(start))
         first = 1.0 / count
         follow = Continuation(
             newton or Newton(linear=direct_solver("auto")),
@@ -167,14 +167,14 @@ class Cell:
     def _gradient(self, F: Gradient) -> tuple[Array, Flags]:
         """Components (dim, dim), and which of them are free."""
         dim = self.system.mesh.dimension
-        given: Any = np.array(F, dtype=object)
-        if given.shape != (dim, dim):
-            raise StudyError(f"F has shape {given.shape}: ({dim}, {dim}) is needed")
-        free: Flags = np.array([[x is None for x in row] for row in given], dtype=bool)
-        found = np.where(free, np.eye(dim), given).astype(np.float64)
-        if not np.isfinite(found).all() or not np.linalg.det(found) > 0.0:
+        components: Any = np.array(F, dtype=object)
+        if components.shape != (dim, dim):
+            raise StudyError(f"F has shape {components.shape}: ({dim}, {dim}) is needed")
+        free: Flags = np.array([[x is None for x in row] for row in components], dtype=bool)
+        gradient = np.where(free, np.eye(dim), components).astype(np.float64)
+        if not np.isfinite(gradient).all() or not np.linalg.det(gradient) > 0.0:
             raise StudyError(f"F = {F}: numbers (or None) with a determinant above 0 are needed")
-        return found, free
+        return gradient, free
 
 
 @dataclass(eq=False)
@@ -183,7 +183,7 @@ class _Path:
 
     cell: Cell
     free: Flags
-    before: Array
+    initial: Array
     after: Array
     x: Array
     histories: dict[str, Array]
@@ -191,24 +191,24 @@ class _Path:
     z: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        basis, w = self.cell.fluctuations, self.x - self._moved(self.before)
+        basis, w = self.cell.fluctuations, self.x - self._moved(self.initial)
         counts: Array = np.asarray(basis.sum(axis=0)).ravel()
-        opened = (self.before - self._unit)[self.free]
+        opened = (self.initial - self._unit)[self.free]
         self.z = np.concatenate([np.asarray(basis.T @ w) / counts, opened])
 
     @property
     def _unit(self) -> Array:
-        return np.eye(len(self.before))
+        return np.eye(len(self.initial))
 
     def _moved(self, F: Array) -> Array:
         return np.asarray(self.cell.modes @ (F - self._unit).ravel())
 
     def problem_at(self, t: float) -> Reduced:
         """The equations at a share of the way."""
-        F = self.before + t * (self.after - self.before)
+        F = self.initial + t * (self.after - self.initial)
         F[self.free] = self._unit[self.free]
         system, cell = self.cell.system, self.cell
-        problem = system.problem(system.still(t, self.x, self.histories))
+        problem = system.problem(system.quasi_static_step(t, self.x, self.histories))
         opened = csc_array(cell.modes[:, self.free.ravel()])
         basis = csc_array(hstack([cell.fluctuations, opened]))
         return Reduced(problem, basis, self._moved(F), F)
@@ -221,15 +221,15 @@ class _Path:
         self._require_balance(reduced.problem.at(x), x)
         self.x = x
         self.histories = self.cell.system.committed(reduced.problem, x, self.histories)
-        whole = Point(point.parameter, replace(point.solution, x=x))
-        result = Result(self.cell.system, reduced.problem.at(x), whole, self.histories)
+        full_point = Point(point.parameter, replace(point.solution, x=x))
+        result = Result(self.cell.system, reduced.problem.at(x), full_point, self.histories)
         self.reached = Homogenised(self.cell, F, result)
 
     def _require_balance(self, problem: Problem, x: Array) -> None:
         """Raise StudyError where a net force acts, which the one node at rest would carry."""
         r, sizes = problem.assembler.residual_and_size(x, problem.parameters)
         nodal = self.cell.system.numbering.nodal
-        for axis in _AXES[: len(self.before)]:
+        for axis in _AXES[: len(self.initial)]:
             numbers = nodal[f"u_{axis}"]
             numbers = numbers[numbers >= 0]
             net = float(r[numbers].sum())
@@ -292,24 +292,26 @@ class Reduced:
         worst = 0.0
         for part in self.problem.layout.fields:
             rows = self.basis[part]
-            known = np.asarray(abs(rows).T @ noise[part])
-            left = np.linalg.norm(np.maximum(np.abs(np.asarray(rows.T @ r[part])) - known, 0.0))
+            rounding = np.asarray(abs(rows).T @ noise[part])
+            left = np.linalg.norm(np.maximum(np.abs(np.asarray(rows.T @ r[part])) - rounding, 0.0))
             size = np.linalg.norm(forces[part])
             worst = max(worst, float(left / size) if size > 0.0 else 0.0)
         return worst
 
 
 def periodic_cell(
-    definition: Statement, pairs: Sequence[tuple[Any, Any]], tolerance: float
+    definition: ProblemDefinition, pairs: Sequence[tuple[Any, Any]], tolerance: float
 ) -> Cell:
     """Return a study as a periodic cell; see `Study.periodic`."""
-    system = equations(definition)
+    system = build_system(definition)
     system.mesh.require_whole("periodic")
     mesh, nodal = system.mesh, system.numbering.nodal
     names = [f"u_{axis}" for axis in _AXES[: mesh.dimension]]
     missing = [name for name in names if name not in nodal]
     if missing:
-        raise StudyError(f"periodic: no unknown {listed(missing)}; at nodes: {listed(nodal)}")
+        raise StudyError(
+            f"periodic: no unknown {join_names(missing)}; at nodes: {join_names(nodal)}"
+        )
     if len(pairs) != mesh.dimension:
         raise StudyError(
             f"periodic: {len(pairs)} pairs of sides; a mesh in {mesh.dimension}-D needs "
@@ -317,7 +319,7 @@ def periodic_cell(
         )
     if definition.conditions:
         raise StudyError(
-            f"periodic: {definition.conditions[0].words}: the cell is moved by F alone, and held "
+            f"periodic: {definition.conditions[0].call}: the cell is moved by F alone, and held "
             "by itself; leave fix out"
         )
     images, shifts = _images(mesh, pairs, tolerance)
@@ -333,15 +335,15 @@ def _images(
     """Group of images of each node, (points,), and the shift of each pair, (dim, dim)."""
     rows, columns, shifts = [], [], []
     for where, to in pairs:
-        ours, theirs = read.nodes_of(mesh, where), read.nodes_of(mesh, to)
-        if len(ours) != len(theirs):
+        side_nodes, partner_nodes = read.nodes_of(mesh, where), read.nodes_of(mesh, to)
+        if len(side_nodes) != len(partner_nodes):
             raise StudyError(
-                f"periodic({where!r}, {to!r}): {len(ours)} and {len(theirs)} nodes; the mesh of "
-                "both sides must be the same"
+                f"periodic({where!r}, {to!r}): {len(side_nodes)} and {len(partner_nodes)} nodes; "
+                "the mesh of both sides must be the same"
             )
-        rows.append(ours)
-        columns.append(read.node_partners(mesh, ours, theirs, tolerance))
-        shifts.append((mesh.points[theirs] - mesh.points[ours]).mean(axis=0))
+        rows.append(side_nodes)
+        columns.append(read.node_partners(mesh, side_nodes, partner_nodes, tolerance))
+        shifts.append((mesh.points[partner_nodes] - mesh.points[side_nodes]).mean(axis=0))
     a, b, n = np.concatenate(rows), np.concatenate(columns), len(mesh.points)
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
     return connected_components(graph, directed=False)[1].astype(np.int64), np.stack(shifts)
@@ -351,24 +353,24 @@ def _fluctuations(system: System, images: Integers, names: Sequence[str]) -> csc
     """Unknowns by free ones, (n, m): images share one; the first node with displacements rests."""
     column = np.arange(system.size)
     for numbers in system.numbering.nodal.values():
-        there = numbers >= 0
+        mask = numbers >= 0
         first = np.full(len(images), system.size)
-        np.minimum.at(first, images[there], numbers[there])
-        column[numbers[there]] = first[images[there]]
+        np.minimum.at(first, images[mask], numbers[mask])
+        column[numbers[mask]] = first[images[mask]]
     starts = [system.numbering.nodal[name] for name in names]
-    held = [int(column[numbers[numbers >= 0][0]]) for numbers in starts]
-    moving = ~np.isin(column, held)
-    used, place = np.unique(column[moving], return_inverse=True)
-    entries = np.ones(len(place)), (np.flatnonzero(moving), place)
+    fixed = [int(column[numbers[numbers >= 0][0]]) for numbers in starts]
+    moving = ~np.isin(column, fixed)
+    used, position = np.unique(column[moving], return_inverse=True)
+    entries = np.ones(len(position)), (np.flatnonzero(moving), position)
     return csc_array(coo_array(entries, shape=(system.size, len(used))))
 
 
 def _modes(system: System, names: Sequence[str]) -> Array:
     """Unknowns by the components of the mean displacement gradient, (n, dim dim)."""
     dim = len(names)
-    found = np.zeros((system.size, dim * dim))
+    modes = np.zeros((system.size, dim * dim))
     for i, name in enumerate(names):
         numbers = system.numbering.nodal[name]
-        there = numbers >= 0
-        found[numbers[there], i * dim : (i + 1) * dim] = system.mesh.points[there, :dim]
-    return found
+        mask = numbers >= 0
+        modes[numbers[mask], i * dim : (i + 1) * dim] = system.mesh.points[mask, :dim]
+    return modes

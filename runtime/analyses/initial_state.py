@@ -40,14 +40,14 @@ def initial_state(system: System, start: Result | None) -> InitialState:
         return InitialState(0.0, system.at_rest(), system.histories())
     if not isinstance(start, Result):
         raise StudyError(f"start is a {type(start).__name__}: a result is needed, as solve() gives")
-    whole, before = system.everywhere, start.system.everywhere
-    if not _same(whole.mesh, before.mesh):
+    target, source = system.everywhere, start.system.everywhere
+    if not _same(target.mesh, source.mesh):
         raise StudyError("start: the result is of another mesh, nodes or cells are not the same")
-    x, values = whole.at_rest(), start.x
-    _take_nodal(whole, before, x, values)
-    _take_others(whole, before, x, values)
+    x, values = target.at_rest(), start.x
+    _take_nodal(target, source, x, values)
+    _take_others(target, source, x, values)
     comm = system.comm
-    histories = comm.restrict_state(_histories(whole, before, start.state))
+    histories = comm.restrict_state(_histories(target, source, start.state))
     return InitialState(start.t, comm.restrict(x), histories)
 
 
@@ -56,47 +56,47 @@ def _same(a: Mesh, b: Mesh) -> bool:
         return True
     if a.points.shape != b.points.shape or a.cells.keys() != b.cells.keys():
         return False
-    near = _NEAR * float(np.ptp(a.points, axis=0).max())
+    tolerance = _NEAR * float(np.ptp(a.points, axis=0).max())
     cells = all(np.array_equal(nodes, b.cells[kind]) for kind, nodes in a.cells.items())
-    return cells and bool(np.abs(a.points - b.points).max() <= near)
+    return cells and bool(np.abs(a.points - b.points).max() <= tolerance)
 
 
-def _take_nodal(whole: System, before: System, x: Array, values: Array) -> None:
+def _take_nodal(target: System, source: System, x: Array, values: Array) -> None:
     """Put values of the result at the nodes into x.  Raises StudyError where there are none."""
-    nowhere = np.full(len(whole.mesh.points), -1)
-    for name, numbers in whole.numbering.nodal.items():
-        old = before.numbering.nodal.get(name, nowhere)
-        here = numbers >= 0
-        known = here & (old >= 0)
-        x[numbers[known]] = values[old[known]]
-        unsaid = here & ~known & np.isnan(whole.start.get(name, np.full(len(here), np.nan)))
+    nowhere = np.full(len(target.mesh.points), -1)
+    for name, numbers in target.numbering.nodal.items():
+        old = source.numbering.nodal.get(name, nowhere)
+        defined = numbers >= 0
+        common = defined & (old >= 0)
+        x[numbers[common]] = values[old[common]]
+        unsaid = defined & ~common & np.isnan(target.start.get(name, np.full(len(defined), np.nan)))
         if unsaid.any():
             node = int(unsaid.argmax())
             raise StudyError(
                 f"start: the result has no {name!r} at node {node} "
-                f"{place_text(whole.mesh.points[node])}; say what it is: study.start({name}=...)"
+                f"{place_text(target.mesh.points[node])}; say what it is: study.start({name}=...)"
             )
 
 
-def _take_others(whole: System, before: System, x: Array, values: Array) -> None:
+def _take_others(target: System, source: System, x: Array, values: Array) -> None:
     """Put values of the result without a node into x: of elements, shared ones, multipliers."""
-    named = set(whole.numbering.nodal)
-    for name, block in whole.blocks.items():
-        own = [(k, slot) for k, slot in enumerate(block.slots) if slot.node is None]
-        named |= {slot.name for _, slot in own} | block.form.places.keys()
-        old = before.blocks.get(name)
-        if not (own or block.form.along) or old is None:
+    named = set(target.numbering.nodal)
+    for name, block in target.blocks.items():
+        without_node = [(k, slot) for k, slot in enumerate(block.slots) if slot.node is None]
+        named |= {slot.name for _, slot in without_node} | block.form.dof_tables.keys()
+        old = source.blocks.get(name)
+        if not (without_node or block.form.along) or old is None:
             continue
         _require_elements(block, old)
-        for along, places in block.form.places.items():
-            if np.array_equal(places, old.form.places.get(along, ())):
-                here, there = (s.numbering.rows(name, along) for s in (whole, before))
-                x[here] = values[there]
-        for k, slot in own:
+        for along, points in block.form.dof_tables.items():
+            if np.array_equal(points, old.form.dof_tables.get(along, ())):
+                target_rows, source_rows = (s.numbering.rows(name, along) for s in (target, source))
+                x[target_rows] = values[source_rows]
+        for k, slot in without_node:
             if slot in old.slots:
-                there = before.numbering.dofs[name][:, old.slots.index(slot)]
-                x[whole.numbering.dofs[name][:, k]] = values[there]
-    new, old_layout = whole.numbering.layout, before.numbering.layout
+                source_rows = source.numbering.dofs[name][:, old.slots.index(slot)]
+                x[target.numbering.dofs[name][:, k]] = values[source_rows]
+    new, old_layout = target.numbering.layout, source.numbering.layout
     for name in new.names:
         if name not in named and name in old_layout.names:  # a tie's
             multipliers = values[old_layout.part(name)]
@@ -104,13 +104,13 @@ def _take_others(whole: System, before: System, x: Array, values: Array) -> None
                 x[new.part(name)] = multipliers
 
 
-def _histories(whole: System, before: System, state: dict[str, Array]) -> dict[str, Array]:
+def _histories(target: System, source: System, state: dict[str, Array]) -> dict[str, Array]:
     """History of points from the result, other point data as this study gives them."""
-    found = whole.histories()
-    for name, initial in found.items():
-        block, old = whole.blocks[name], before.blocks.get(name)
-        kept = [] if old is None else [n for n in block.kernel.history if n in old.kernel.history]
-        if old is None or not kept:
+    histories = target.histories()
+    for name, initial in histories.items():
+        block, old = target.blocks[name], source.blocks.get(name)
+        common = [] if old is None else [n for n in block.kernel.history if n in old.kernel.history]
+        if old is None or not common:
             continue
         _require_elements(block, old)
         if state[name].shape[1] != initial.shape[1]:
@@ -118,11 +118,11 @@ def _histories(whole: System, before: System, state: dict[str, Array]) -> dict[s
                 f"start: {name!r} has {initial.shape[1]} points in an element, in the result it "
                 f"has {state[name].shape[1]}"
             )
-        found[name] = initial.copy()
-        for n in kept:
+        histories[name] = initial.copy()
+        for n in common:
             column = old.kernel.point_data.index(n)
-            found[name][:, :, block.kernel.point_data.index(n)] = state[name][:, :, column]
-    return found
+            histories[name][:, :, block.kernel.point_data.index(n)] = state[name][:, :, column]
+    return histories
 
 
 def _require_elements(block: Block, old: Block) -> None:

@@ -12,13 +12,13 @@ from softehl.runtime.analyses.initial_state import SMALLEST, InitialState, initi
 from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.arrays import Array, count_of
 from softehl.runtime.definition.argument_checks import finite, function
-from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.problem import Problem
-from softehl.runtime.equations.rigid_body_modes import require_held
+from softehl.runtime.equations.rigid_body_modes import require_supported
 from softehl.runtime.equations.stability import warn_unstable
 from softehl.runtime.equations.system import Step, System
 from softehl.runtime.results.result import Result
-from softehl.runtime.sensitivity.tape import Trail, continued
+from softehl.runtime.sensitivity.tape import Tape, continued_tape
 from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.linear.factorisation_cache import iterative_part
 from softehl.runtime.solve.linear.linear_solver import LinearSolver
@@ -46,7 +46,7 @@ class LoadHistory:
     on_step: Callable[[Result], object]
     keep_all: bool = False
     memory: LastFactorisation | None = None
-    previous: Trail | None = None
+    previous: Tape | None = None
     record: bool = False
     linear: LinearSolver | None = None
     results: list[Result] = field(default_factory=list)
@@ -70,23 +70,23 @@ class LoadHistory:
         self.x = point.solution.x
         self.histories = self.system.committed(problem, self.x, self.histories)
         problem = problem.at(self.x)
-        trail = Trail(
+        tape = Tape(
             self.system,
             step,
             problem,
             self.x,
-            before=previous if self.record else None,
-            kept=self.memory,
+            previous=previous if self.record else None,
+            last_factors=self.memory,
             linear=None if self.linear is None else iterative_part(self.linear),
         )
-        result = Result(self.system, problem, point, self.histories, trail)
+        result = Result(self.system, problem, point, self.histories, tape)
         if not self.keep_all:
             self.results.clear()
         self.results.append(result)
         self.on_step(result)
 
     def _step(self, t: float) -> Step:
-        return self.system.still(t, self.x, self.histories)
+        return self.system.quasi_static_step(t, self.x, self.histories)
 
     def require_end(self, branch: Branch) -> None:
         """Raise NotConverged where the path did not reach its end."""
@@ -95,7 +95,7 @@ class LoadHistory:
 
 
 def solve(
-    definition: Statement,
+    definition: ProblemDefinition,
     *,
     steps: int = 1,
     until: float = 1.0,
@@ -120,7 +120,7 @@ def solve(
             initial,
             callbacks,
             memory=first_step.memory if options.record or system.size <= _FEW_UNKNOWNS else None,
-            previous=continued(system, start.trail if start else None),
+            previous=continued_tape(system, start.trail if start else None),
             record=options.record,
             linear=prepared.newton.linear,
         )
@@ -133,7 +133,7 @@ def solve(
         first = abs(until - initial.t) / count or 1.0
         with np.errstate(all="ignore"):
             ahead = history.problem_at(initial.t + (until - initial.t) / count)
-            require_held(system, ahead, initial.x)
+            require_supported(system, ahead, initial.x)
         rule = StepRule(first, min(SMALLEST, first), first)
         path = Continuation(first_step.newton, rule, name=LOAD_FACTOR)
         branch = path.follow(history.problem_at, initial.t, until, initial.x, on_point=commit)

@@ -6,7 +6,7 @@ import numpy as np
 
 from softehl.runtime.analyses.initial_state import initial_state
 from softehl.runtime.analyses.solver_options import SolverOptions
-from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.results.result import Modes, Result
 from softehl.runtime.solve.solution import Point, Solution, Status
@@ -16,7 +16,7 @@ _BALANCED = 1e-6
 
 
 def modes(
-    definition: Statement,
+    definition: ProblemDefinition,
     count: int = 6,
     *,
     mass: Masses | None = None,
@@ -26,7 +26,7 @@ def modes(
     """Return the lowest natural modes; see `Study.modes`."""
     system = options.prepare(definition).system
     initial = initial_state(system, start)
-    problem = system.problem(system.still(initial.t, initial.x, initial.histories))
+    problem = system.problem(system.quasi_static_step(initial.t, initial.x, initial.histories))
     with np.errstate(all="ignore"):
         tangent = problem.linearise(initial.x)[1]
         residual = problem.measure(initial.x, tangent, rounded=True)

@@ -20,7 +20,7 @@ from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.system import Step, System
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.results.result import Result
-from softehl.runtime.suggestions import listed, meant
+from softehl.runtime.suggestions import did_you_mean, join_names
 
 GAIN = 0.05
 """Of the largest sum of energies so far: a motion that has gained more by its scheme, in so many
@@ -101,10 +101,10 @@ class Motion(Result):
         return self._nodal(name, self.a)
 
     def _nodal(self, name: str, values: Array) -> Array:
-        nodal, values = self._whole.numbering.nodal, self.system.comm.gather(values)
+        nodal, values = self._global_system.numbering.nodal, self.system.comm.gather(values)
         if name not in nodal:
             raise UnknownNameError(
-                f"no unknown {name!r}{meant(name, nodal)}; at nodes: {listed(nodal)}"
+                f"no unknown {name!r}{did_you_mean(name, nodal)}; at nodes: {join_names(nodal)}"
             )
         return np.where(nodal[name] >= 0, values[nodal[name]], np.nan)
 
@@ -150,25 +150,25 @@ class Roles:
     def in_system(cls, system: System) -> Roles:
         """Of the equations without inertia."""
         names = contact_blocks(system)
-        found: dict[str, Role] = {}
+        roles: dict[str, Role] = {}
         multipliers = [c.multipliers[c.multipliers >= 0] for c in system.contacts]
         bound = [n[n >= 0] for n in (c.displacements[c.nodes] for c in system.contacts)]
         for block in system.assembler.blocks:
             kernel, page = block.kernel, system.blocks.get(block.name)
             if block.name in names:
-                found[block.name] = "contact"
+                roles[block.name] = "contact"
             elif isinstance(kernel, Tie):
-                found[block.name] = "tie"
+                roles[block.name] = "tie"
                 multipliers.append(block.dofs[:, 2])
                 bound.append(block.dofs[:, :2].ravel())
             elif isinstance(kernel, DeadLoad | NodalForce | Pressure):
-                found[block.name] = "load"
+                roles[block.name] = "load"
             else:
                 past = page is not None and page.previous
-                found[block.name] = "energy" if has_energy(kernel) and not past else "work"
+                roles[block.name] = "energy" if has_energy(kernel) and not past else "work"
         none = np.empty(0, dtype=np.int64)
         numbers = [np.unique(np.concatenate([none, *parts])) for parts in (multipliers, bound)]
-        return cls(found, *numbers)
+        return cls(roles, *numbers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,8 +212,8 @@ class Forces:
 
     def mean(self, other: Forces) -> Forces:
         """Mean of both; of ties and contacts those of the other, which are means of its step."""
-        ends = ("loads", "stored", "others")
-        return replace(other, **{n: 0.5 * (getattr(self, n) + getattr(other, n)) for n in ends})
+        averaged = ("loads", "stored", "others")
+        return replace(other, **{n: 0.5 * (getattr(self, n) + getattr(other, n)) for n in averaged})
 
 
 def has_energy(kernel: object) -> bool:
@@ -228,11 +228,11 @@ def has_energy(kernel: object) -> bool:
 
 def stored_energy(problem: Problem, x: Array, roles: Roles | None = None) -> float:
     """Energies of springs and pages of this process at unknowns x, (n,)."""
-    found = 0.0
+    energy = 0.0
     for block in problem.assembler.blocks:
         if has_energy(block.kernel) if roles is None else roles.of.get(block.name) == "energy":
-            found += _energy(block, x, problem.parameters[block.name])
-    return found
+            energy += _energy(block, x, problem.parameters[block.name])
+    return energy
 
 
 def _energy(block: ElementBlock, x: Array, parameters: Array) -> float:
@@ -246,27 +246,27 @@ def _energy(block: ElementBlock, x: Array, parameters: Array) -> float:
 
 
 def parameter_work(
-    before: Problem, end: Problem, roles: Roles, xs: tuple[Array, Array], middle: Problem | None
+    initial: Problem, end: Problem, roles: Roles, xs: tuple[Array, Array], middle: Problem | None
 ) -> float:
     """Work of parameters that changed in a step: on unknowns xs, those of its ends.
 
     middle: with whose parameters the forces of the step were averaged; None: forces are means of
     those at both ends.
     """
-    found = 0.0
+    work = 0.0
     for block in end.assembler.blocks:
         if roles.of.get(block.name) != "energy":
             continue
-        old, new = (p.parameters[block.name] for p in (before, end))
+        old, new = (p.parameters[block.name] for p in (initial, end))
         mean = new if middle is None else middle.parameters[block.name]
         if np.array_equal(old, new) and np.array_equal(mean, new):
             continue
         W = [[_energy(block, x, p) for p in (old, mean, new)] for x in xs]
         if middle is None:
-            found += 0.5 * (W[0][2] - W[0][0] + W[1][2] - W[1][0])
+            work += 0.5 * (W[0][2] - W[0][0] + W[1][2] - W[1][0])
         else:
-            found += W[0][1] - W[0][0] + W[1][2] - W[1][1]
-    return found
+            work += W[0][1] - W[0][0] + W[1][2] - W[1][1]
+    return work
 
 
 class EnergyGain(RuntimeWarning):
@@ -298,7 +298,7 @@ class Ledger:
         self.external += float((supports - forces.loads - forces.ties) @ moved)
         self.others += float(forces.others @ moved)
 
-    def told(
+    def balance(
         self, t: float, kinetic: float, stored: float, forces: Forces, x: Array
     ) -> dict[str, float]:
         """Energies at time t, of all processes; warns of a gain that has no source.
@@ -307,8 +307,8 @@ class Ledger:
         that have none.
         """
         size = 0.5 * float((forces.stored + forces.others) @ x)
-        known = np.array([kinetic, stored, self.external, self.others, size])
-        kinetic, stored, external, others, size = self.comm.sum(known).tolist()
+        local_energies = np.array([kinetic, stored, self.external, self.others, size])
+        kinetic, stored, external, others, size = self.comm.sum(local_energies).tolist()
         internal = stored + others
         if np.isnan(self.first):
             self.first = kinetic + internal

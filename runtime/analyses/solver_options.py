@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from softehl.runtime.analyses.callbacks import Callbacks, Progress, Series
-from softehl.runtime.definition.problem_definition import Statement
+from softehl.runtime.definition.problem_definition import ProblemDefinition
 from softehl.runtime.equations.system import System
-from softehl.runtime.equations.system_builder import equations
+from softehl.runtime.equations.system_builder import build_system
 from softehl.runtime.parallel.engine import AnyEngine, engine_of, note_of
 from softehl.runtime.parallel.linear_solver_choice import Linear
 from softehl.runtime.results.result import Result
@@ -50,8 +50,8 @@ class SolverOptions:
     def merged(cls, options: SolverOptions | None, **keywords: Any) -> SolverOptions:
         """Return options, with the keywords that differ from their default."""
         default = cls()
-        given = {n: v for n, v in keywords.items() if v is not getattr(default, n)}
-        return replace(options or default, **given)
+        values = {n: v for n, v in keywords.items() if v is not getattr(default, n)}
+        return replace(options or default, **values)
 
     @classmethod
     def split(cls, arguments: Mapping[str, Any]) -> tuple[SolverOptions, dict[str, Any]]:
@@ -61,13 +61,13 @@ class SolverOptions:
         keywords = {name: others.pop(name) for name in names if name in others}
         return cls.merged(others.pop("options", None), **keywords), others
 
-    def prepare(self, definition: Statement) -> PreparedSystem:
+    def prepare(self, definition: ProblemDefinition) -> PreparedSystem:
         """Return the equations of a definition, distributed, with Newton's method for them.
 
         Raises StudyError.
         """
         engine = engine_of(self.engine, self.linear)
-        system = engine.spread(equations(definition))
+        system = engine.spread(build_system(definition))
         return PreparedSystem(system, engine.newton(system, self.newton), note_of(engine), self)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.suggestions import meant
+from softehl.runtime.suggestions import did_you_mean
 
 ROUNDING = 1e-12  # of the whole time: a step is not cut to less than that before the end
 
@@ -26,15 +26,15 @@ class Affine:
     """c u + rest, of the unknowns u at the end of a step: rest is (n,)."""
 
     c: float
-    rest: Array
+    constant: Array
 
     def at(self, u: Array) -> Array:
         """Its value, (n,)."""
-        return self.c * u + self.rest
+        return self.c * u + self.constant
 
     def combined(self, factor: float, vector: Array, vector_factor: float) -> Affine:
         """factor times this one, plus vector_factor times a vector."""
-        return Affine(factor * self.c, factor * self.rest + vector_factor * vector)
+        return Affine(factor * self.c, factor * self.constant + vector_factor * vector)
 
 
 class Kinematics(Protocol):
@@ -277,7 +277,7 @@ class _WeightedForces:
     def velocity(self, dt: float, state: Kinematics) -> Affine:
         """See `SecondOrderIntegrator`."""
         final, g = self.acceleration(dt, state), self._coefficients()[3] * dt
-        return Affine(g * final.c, state.v + (dt - g) * state.a + g * final.rest)
+        return Affine(g * final.c, state.v + (dt - g) * state.a + g * final.constant)
 
     def acceleration(self, dt: float, state: Kinematics) -> Affine:
         """See `SecondOrderIntegrator`."""
@@ -463,23 +463,23 @@ def integrator_of(method: object, **parameters: float | None) -> TimeIntegrator:
 
     Raises StudyError for an unknown name, and for a parameter that the integrator does not have.
     """
-    given = {name: value for name, value in parameters.items() if value is not None}
+    values = {name: value for name, value in parameters.items() if value is not None}
     kinds = FirstOrderIntegrator | SecondOrderIntegrator | CentralDifference
     if isinstance(method, kinds) and not isinstance(method, type):
-        for name, value in given.items():
+        for name, value in values.items():
             raise StudyError(f"{name} = {value:g}: give it to the integrator, not beside {method}")
         return method
     if not isinstance(method, str) or method not in INTEGRATORS:
         names = ", ".join(f'"{name}"' for name in INTEGRATORS)
         raise StudyError(
-            f"method = {method!r}{meant(method, INTEGRATORS)}: allowed are {names}, or an "
+            f"method = {method!r}{did_you_mean(method, INTEGRATORS)}: allowed are {names}, or an "
             "integrator such as softehl.BDF2()"
         )
-    for name, value in given.items():
+    for name, value in values.items():
         having = [f'"{n}"' for n, kind in INTEGRATORS.items() if name in signature(kind).parameters]
         if f'"{method}"' not in having:
             raise StudyError(f"{name} = {value:g}: only method = {', '.join(having)} has it")
-    return INTEGRATORS[method](**given)
+    return INTEGRATORS[method](**values)
 
 
 def require_arguments(
@@ -489,13 +489,13 @@ def require_arguments(
 
     Raises StudyError for one that the signature of `march` does not have.
     """
-    given = {name: value for name, value in arguments.items() if value is not None}
-    for name in given:
+    values = {name: value for name, value in arguments.items() if value is not None}
+    for name in values:
         if name not in signature(march).parameters:
             raise StudyError(
                 f'{name}: method = "{integrator.name}" has no such thing; leave it out'
             )
-    return given
+    return values
 
 
 def step_before_end(remaining: float, dt: float) -> float:

@@ -28,13 +28,13 @@ from softehl.runtime.analyses.time_integrators import (
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.argument_checks import finite, writable
 from softehl.runtime.definition.contact_sides import MULTIPLIERS
-from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.loads import Tie
-from softehl.runtime.equations.rigid_body_modes import require_held
+from softehl.runtime.equations.rigid_body_modes import require_supported
 from softehl.runtime.equations.system import Step, System
 from softehl.runtime.results.checkpoint import TimeLevels, digests_of
 from softehl.runtime.results.result import Result
-from softehl.runtime.sensitivity.tape import Trail, continued
+from softehl.runtime.sensitivity.tape import Tape, continued_tape
 from softehl.runtime.solve.continuation import (
     End,
     PathLog,
@@ -53,7 +53,7 @@ _GROWTH, _CUT, _SAFETY = 2.0, 0.2, 0.9
 
 
 def march(
-    definition: Statement,
+    definition: ProblemDefinition,
     *,
     dt: float,
     until: float,
@@ -73,16 +73,18 @@ def march(
     if arguments.get("start") is not None and arguments.get("restart") is not None:
         raise StudyError("start and restart: give one of them, a result or a checkpoint")
     if isinstance(integrator, FirstOrderIntegrator):
-        given = require_arguments(integrator, march_of_first_order, arguments)
+        family_arguments = require_arguments(integrator, march_of_first_order, arguments)
         return march_of_first_order(
-            definition, integrator, dt=dt, until=until, options=options, **given
+            definition, integrator, dt=dt, until=until, options=options, **family_arguments
         )
-    given = require_arguments(integrator, march_with_inertia, arguments)
-    return march_with_inertia(definition, integrator, dt=dt, until=until, options=options, **given)
+    family_arguments = require_arguments(integrator, march_with_inertia, arguments)
+    return march_with_inertia(
+        definition, integrator, dt=dt, until=until, options=options, **family_arguments
+    )
 
 
 def march_of_first_order(
-    definition: Statement,
+    definition: ProblemDefinition,
     integrator: FirstOrderIntegrator,
     *,
     dt: float,
@@ -112,7 +114,7 @@ def march_of_first_order(
         dt,
         prepared.newton,
         record=options.record,
-        previous=continued(system, start.trail if start else None),
+        previous=continued_tape(system, start.trail if start else None),
     )
     file = series = None
     if checkpoint is not None:
@@ -152,7 +154,7 @@ class AdaptiveMarch:
     dt: float
     newton: Newton
     record: bool = False
-    previous: Trail | None = None
+    previous: Tape | None = None
 
     def run(
         self, system: System, levels: TimeLevels, until: float, checkpoint: Path | None
@@ -164,7 +166,7 @@ class AdaptiveMarch:
         shortest = min(length, SMALLEST * self.dt)  # longer ones may be cut
         with np.errstate(all="ignore"):
             problem = system.problem(self.step(system, levels, shortest))
-            require_held(system, problem, levels.states[0])
+            require_supported(system, problem, levels.states[0])
         first_step = SupportCheck(self.newton)
         stepper = _TimeStepper(
             march=self,
@@ -192,13 +194,13 @@ class AdaptiveMarch:
         times = levels.times[: self.integrator.order]
         lengths = [dt, *(newer - older for newer, older in pairwise(times))]
         rate, *weights = self.integrator.weights(lengths).tolist()
-        rest = np.einsum("k,kn->n", weights, levels.states[: len(weights)])
+        rate_offset = np.einsum("k,kn->n", weights, levels.states[: len(weights)])
         return Step(
             t=levels.t + dt,
             factor=1.0,
             old=levels.states[0],
             rate=rate,
-            rest=rest,
+            rate_offset=rate_offset,
             dt=dt,
             histories=levels.histories,
             weights=tuple(weights),
@@ -228,10 +230,10 @@ class AdaptiveMarch:
             size, change = (_largest(system, values[part]) for values in (x, difference))
             error = fraction * change / max(size, 1e-300)
             if error > self.tolerance:
-                wrong = x.copy()
-                wrong[part] -= fraction * difference[part]
+                perturbed = x.copy()
+                perturbed[part] -= fraction * difference[part]
                 with np.errstate(all="ignore"):
-                    residual = problem.measure(wrong, problem.linearise(x)[1])
+                    residual = problem.measure(perturbed, problem.linearise(x)[1])
                 error = error if residual > self.newton.tolerance else 0.0
             worst = max(worst, error)
         if worst == 0.0:
@@ -296,16 +298,16 @@ class _TimeStepper(Stepper):
         self.levels = TimeLevels(times, states, histories, attempt.next_step)
         problem = problem.at(solution.x)
         previous = self.result.trail if self.result else self.march.previous
-        trail = Trail(
+        tape = Tape(
             system,
             step,
             problem,
             solution.x,
-            before=previous if self.memory else None,
-            kept=self.memory,
+            previous=previous if self.memory else None,
+            last_factors=self.memory,
             linear=iterative_part(self.march.newton.linear),
         )
-        self.result = Result(system, problem, Point(step.t, solution), histories, trail)
+        self.result = Result(system, problem, Point(step.t, solution), histories, tape)
 
     def end(self) -> End | None:
         """See `Stepper`."""

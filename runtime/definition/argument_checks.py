@@ -15,40 +15,46 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.definition.problem_definition import Datum, Number, StudyError, Where, shown
+from softehl.runtime.definition.problem_definition import (
+    Datum,
+    Number,
+    StudyError,
+    Where,
+    display_name,
+)
 from softehl.runtime.discretisation.loads import Amount
 from softehl.runtime.io import require_writable
 from softehl.runtime.mesh.mesh import Mesh, place_text
-from softehl.runtime.suggestions import listed, meant, misfit
+from softehl.runtime.suggestions import did_you_mean, join_names, misfit
 
 
 def finite(name: str, value: object) -> float:
     """A number.  Raises StudyError."""
-    found: Any = value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
-    if isinstance(found, bool | np.bool_) or not isinstance(found, Real):
+    number: Any = value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
+    if isinstance(number, bool | np.bool_) or not isinstance(number, Real):
         raise StudyError(f"{name} = {value!r}: a real number is needed, or a function")
-    if not np.isfinite(float(found)):
+    if not np.isfinite(float(number)):
         raise StudyError(f"{name} = {value!r}: the number must be finite")
-    return float(found)
+    return float(number)
 
 
-def writable(words: str, path: Path) -> Path:
+def writable(context: str, path: Path) -> Path:
     """A file that can be written; its folder is made.  Raises StudyError."""
     try:
         require_writable(path)
     except OSError as error:
-        raise StudyError(f"{words}: cannot write to {error.filename}: {error.strerror}") from None
+        raise StudyError(f"{context}: cannot write to {error.filename}: {error.strerror}") from None
     return path
 
 
-def amount(words: str, name: str, value: Amount) -> Amount:
+def amount(context: str, name: str, value: Amount) -> Amount:
     """A prescribed value or load: a number, or a function of (x, t) whose values are checked.
 
-    words: the call, for messages. Raises StudyError.
+    context: the call, for messages. Raises StudyError.
     """
     if not callable(value):
         return finite(name, value)
-    return Told(words, function(words, value, "x", "t"))
+    return PointFunction(context, function(context, value, "x", "t"))
 
 
 def parameter(block: str, name: str, value: Number) -> Number:
@@ -60,126 +66,129 @@ def parameter(block: str, name: str, value: Number) -> Number:
         )
     if not callable(value):
         return finite(f"{block!r}: {name}", value)
-    return Rising(f"{block!r}: {name}", function(f"{block!r}: {name}", value, "t"))
+    return TimeFunction(f"{block!r}: {name}", function(f"{block!r}: {name}", value, "t"))
 
 
 def datum(block: str, name: str, value: Datum, centres: Array) -> Array:
     """One number a place, (n,).  Raises StudyError."""
-    words = f"{block!r}: {name}"
-    found = function(words, value, "x")(centres) if callable(value) else value
-    return np.broadcast_to(_real(words, found, centres), (len(centres),)).copy()
+    context = f"{block!r}: {name}"
+    values = function(context, value, "x")(centres) if callable(value) else value
+    return np.broadcast_to(_real(context, values, centres), (len(centres),)).copy()
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class PointFunction:
     """A function of places (n, dim) and t as it was given, whose values are looked at."""
 
-    words: str
+    context: str
     function: Callable[[Array, float], Array | float]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For `pickle`.  Raises StudyError."""
-        return type(self), (self.words, _pickled(self.words, self.function))
+        return type(self), (self.context, _pickled(self.context, self.function))
 
-    def __deepcopy__(self, memo: object) -> Told:
+    def __deepcopy__(self, memo: object) -> PointFunction:
         """Itself."""
         return self
 
-    def __call__(self, places: Array, t: float) -> Array:
+    def __call__(self, points: Array, t: float) -> Array:
         """One number, or (n,) of them.  Raises StudyError."""
-        return _real(f"{self.words} at t = {t:g}", self.function(places, t), places)
+        return _real(f"{self.context} at t = {t:g}", self.function(points, t), points)
 
 
 @dataclass(frozen=True, eq=False)
-class Rising:
+class TimeFunction:
     """A function of t as it was given, whose values are looked at."""
 
-    words: str
+    context: str
     function: Callable[[float], float]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For `pickle`.  Raises StudyError."""
-        return type(self), (self.words, _pickled(self.words, self.function))
+        return type(self), (self.context, _pickled(self.context, self.function))
 
-    def __deepcopy__(self, memo: object) -> Rising:
+    def __deepcopy__(self, memo: object) -> TimeFunction:
         """Itself."""
         return self
 
     def __call__(self, t: float) -> float:
         """Raises StudyError."""
-        words = f"{self.words} at t = {t:g}"
+        context = f"{self.context} at t = {t:g}"
         try:
-            found = self.function(t)
+            result = self.function(t)
         except TypeError as error:  # a function of places, say
             raise StudyError(
-                f"{words}: {error}; a parameter is a number or a function of the load factor or "
+                f"{context}: {error}; a parameter is a number or a function of the load factor or "
                 "time, one number that all elements of a block have"
             ) from error
-        return float(_real(words, found, ()))
+        return float(_real(context, result, ()))
 
 
-def _pickled(words: str, function: Callable[..., Any]) -> Callable[..., Any]:
+def _pickled(context: str, function: Callable[..., Any]) -> Callable[..., Any]:
     """A function that can be pickled.  Raises StudyError."""
     try:
         pickle.dumps(function)
     except (pickle.PicklingError, AttributeError, TypeError):
         name = getattr(function, "__name__", repr(function))
         raise StudyError(
-            f"{words}: {name} cannot be pickled: write it as a function of a module (def at the "
+            f"{context}: {name} cannot be pickled: write it as a function of a module (def at the "
             "left margin of a file)"
         ) from None
     return function
 
 
-def function(words: str, given: Callable[..., Any], *arguments: str) -> Callable[..., Any]:
+def function(context: str, value: Callable[..., Any], *arguments: str) -> Callable[..., Any]:
     """A function, if it can be called with these.  Raises StudyError."""
-    wrong = misfit(given, *arguments)
-    if wrong:
-        raise StudyError(f"{words}: {wrong}")
-    return given
+    mismatch = misfit(value, *arguments)
+    if mismatch:
+        raise StudyError(f"{context}: {mismatch}")
+    return value
 
 
-def _real(words: str, value: object, places: Array | tuple[()]) -> Array:
+def _real(context: str, value: object, points: Array | tuple[()]) -> Array:
     """One finite real number, or one for each place: () or (n,).  Raises StudyError."""
     if isinstance(value, np.ma.MaskedArray):
-        raise StudyError(f"{words}: a masked array, whose mask says nothing here: fill it first")
-    found = np.asarray(value)
-    shapes = [(), (len(places),)] if isinstance(places, np.ndarray) else [()]
-    many = f", or ({len(places)},) of them" if len(shapes) > 1 else ""
-    if found.dtype.kind == "O":  # numbers of SymPy, say
+        raise StudyError(f"{context}: a masked array, whose mask says nothing here: fill it first")
+    numbers = np.asarray(value)
+    shapes = [(), (len(points),)] if isinstance(points, np.ndarray) else [()]
+    many = f", or ({len(points)},) of them" if len(shapes) > 1 else ""
+    if numbers.dtype.kind == "O":  # numbers of SymPy, say
         try:
-            found = found.astype(np.float64)
+            numbers = numbers.astype(np.float64)
         except (TypeError, ValueError):
-            found = found.astype(str)
-    if found.dtype.kind not in "fiu" or found.shape not in shapes:
+            numbers = numbers.astype(str)
+    if numbers.dtype.kind not in "fiu" or numbers.shape not in shapes:
         columns = ""
-        shape = np.shape(places)
-        if many and len(shape) == 2 and found.shape in (shape, shape[1:]):
+        shape = np.shape(points)
+        if many and len(shape) == 2 and numbers.shape in (shape, shape[1:]):
             columns = f"; x has all places, {shape}, in columns: x[:, 0], ..."
         raise StudyError(
-            f"{words}: one real number{many} is needed; given {found.dtype} of shape {found.shape}"
-            + columns
+            f"{context}: one real number{many} is needed; given {numbers.dtype} of shape "
+            f"{numbers.shape}{columns}"
         )
-    bad = np.flatnonzero(~np.isfinite(found))
+    bad = np.flatnonzero(~np.isfinite(numbers))
     if len(bad):
-        at = f" at {place_text(places[bad[0]])}" if found.ndim else ""
-        raise StudyError(f"{words} is {np.ravel(found)[bad[0]]}{at}: numbers must be finite")
-    return found.astype(np.float64)
+        at = f" at {place_text(points[bad[0]])}" if numbers.ndim else ""
+        raise StudyError(f"{context} is {np.ravel(numbers)[bad[0]]}{at}: numbers must be finite")
+    return numbers.astype(np.float64)
 
 
-def named(words: str, values: Mapping[str, object] | tuple[str, ...], example: str) -> None:
+def require_unknowns(
+    context: str, values: Mapping[str, object] | tuple[str, ...], example: str
+) -> None:
     """Raise StudyError where no unknown is named."""
     if not values:
-        raise StudyError(f"{words}: name an unknown, as in {example}")
+        raise StudyError(f"{context}: name an unknown, as in {example}")
 
 
-def known(what: str, given: Iterable[str], allowed: Iterable[str], of: str) -> None:
+def require_names(what: str, requested: Iterable[str], allowed: Iterable[str], of: str) -> None:
     """Raise StudyError for a name that is not among the allowed ones."""
     names = list(dict.fromkeys(allowed))
-    for name in given:
+    for name in requested:
         if name not in names:
             raise StudyError(
-                f"{of} has no {what} {name!r}{meant(name, names)}; it has {listed(names)}"
+                f"{of} has no {what} {name!r}{did_you_mean(name, names)}; it has "
+                f"{join_names(names)}"
             )
 
 
@@ -189,21 +198,21 @@ def nodes_of(mesh: Mesh, where: Where) -> Integers:
         return mesh.nodes(where)
     if isinstance(where, np.ma.MaskedArray):
         raise StudyError("node numbers are a masked array, whose mask says nothing here")
-    given = np.asarray(where)
-    if isinstance(where, tuple) or given.dtype.kind == "f":
-        return mesh.nodes_at(given)
-    if given.dtype.kind not in "iu" or given.ndim != 1 or not mesh.anywhere(given.size):
-        raise StudyError(f"{shown(where)}: node numbers are a list of integers")
-    if given.size and not 0 <= given.min() <= given.max() < len(mesh.points):
+    numbers = np.asarray(where)
+    if isinstance(where, tuple) or numbers.dtype.kind == "f":
+        return mesh.nodes_at(numbers)
+    if numbers.dtype.kind not in "iu" or numbers.ndim != 1 or not mesh.anywhere(numbers.size):
+        raise StudyError(f"{display_name(where)}: node numbers are a list of integers")
+    if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(mesh.points):
         raise StudyError(f"node numbers go from 0 to {len(mesh.points) - 1}")
-    if len(np.unique(given)) < len(given):
-        raise StudyError(f"{shown(where)}: a node number stands twice")
-    return given.astype(np.int64)
+    if len(np.unique(numbers)) < len(numbers):
+        raise StudyError(f"{display_name(where)}: a node number stands twice")
+    return numbers.astype(np.int64)
 
 
 def partners(
-    ours: Array,
-    theirs: Array,
+    side_points: Array,
+    partner_points: Array,
     tolerance: float,
     bodies: Callable[[], tuple[Integers, Integers]] | None = None,
 ) -> Integers:
@@ -211,26 +220,31 @@ def partners(
     shift between both centres. Nodes at one place have partners of their own body; bodies: numbers
     of the bodies of ours and theirs, (n,).  Raises StudyError where there is none.
     """
-    a, b = ours - ours.mean(axis=0), theirs - theirs.mean(axis=0)
-    distance, chosen = map(np.asarray, cKDTree(b).query(a))
-    size = max(float(np.ptp(ours, axis=0).max()), float(np.abs(ours - theirs).max()))
-    worst, rounding = float(distance.max()), 8 * np.finfo(np.float64).eps * np.abs(ours).max()
+    a, b = side_points - side_points.mean(axis=0), partner_points - partner_points.mean(axis=0)
+    distance, nearest = map(np.asarray, cKDTree(b).query(a))
+    size = max(
+        float(np.ptp(side_points, axis=0).max()), float(np.abs(side_points - partner_points).max())
+    )
+    worst, rounding = (
+        float(distance.max()),
+        8 * np.finfo(np.float64).eps * np.abs(side_points).max(),
+    )
     limit = max(tolerance * size, float(rounding))
     if not worst <= limit:
         raise StudyError(
             f"tie: the nodes of both sides do not fit, they are {worst:.3g} apart at "
-            f"{place_text(ours[int(distance.argmax())])} (allowed: {limit:.3g}); sides "
+            f"{place_text(side_points[int(distance.argmax())])} (allowed: {limit:.3g}); sides "
             "of equal nodes but for a shift are tied, tolerance=... is relative to their size"
         )
-    if len(np.unique(chosen)) == len(chosen):
-        return np.asarray(chosen, dtype=np.int64)
-    twice = ours[np.bincount(chosen)[chosen] > 1][0]
+    if len(np.unique(nearest)) == len(nearest):
+        return np.asarray(nearest, dtype=np.int64)
+    twice = side_points[np.bincount(nearest)[nearest] > 1][0]
     if bodies is not None:
         far = 2.0 * (size or 1.0)
         a, b = (np.column_stack([x, far * k]) for x, k in zip((a, b), bodies(), strict=True))
-        distance, chosen = map(np.asarray, cKDTree(b).query(a))
-        if distance.max() <= limit and len(np.unique(chosen)) == len(chosen):
-            return np.asarray(chosen, dtype=np.int64)
+        distance, nearest = map(np.asarray, cKDTree(b).query(a))
+        if distance.max() <= limit and len(np.unique(nearest)) == len(nearest):
+            return np.asarray(nearest, dtype=np.int64)
     raise StudyError(
         f"tie: two nodes at {place_text(twice)} have the same partner: nodes at one place are tied "
         "body by body, one of each body, and here the bodies of both sides differ or one has two; "
@@ -238,7 +252,9 @@ def partners(
     )
 
 
-def node_partners(mesh: Mesh, ours: Integers, theirs: Integers, tolerance: float) -> Integers:
+def node_partners(
+    mesh: Mesh, side_nodes: Integers, partner_nodes: Integers, tolerance: float
+) -> Integers:
     """For each of our nodes its partner among theirs, node numbers (n,).  Raises StudyError."""
 
     def bodies() -> tuple[Integers, Integers]:
@@ -247,6 +263,8 @@ def node_partners(mesh: Mesh, ours: Integers, theirs: Integers, tolerance: float
         size = len(mesh.points)
         graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(size, size))
         label = connected_components(graph, directed=False)[1].astype(np.int64)
-        return label[ours], label[theirs]
+        return label[side_nodes], label[partner_nodes]
 
-    return theirs[partners(mesh.points[ours], mesh.points[theirs], tolerance, bodies)]
+    return partner_nodes[
+        partners(mesh.points[side_nodes], mesh.points[partner_nodes], tolerance, bodies)
+    ]

@@ -12,14 +12,14 @@ from softehl.runtime.definition.element_blocks import page_on
 from softehl.runtime.definition.problem_definition import (
     Block,
     Form,
-    Statement,
+    ProblemDefinition,
     StudyError,
-    shown,
+    display_name,
 )
 from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, Predicate
-from softehl.runtime.suggestions import listed
+from softehl.runtime.suggestions import join_names
 
 MULTIPLIERS = {2: ("lambda", "tau"), 3: ("lambda", "tau_x", "tau_y", "tau_z")}
 """Unknowns of a contact by the dimension of its mesh."""
@@ -51,63 +51,69 @@ class Touch:
 
 
 def add_contact(
-    definition: Statement,
+    definition: ProblemDefinition,
     name: str,
     sides: tuple[str | Predicate, str | Predicate | None],
     of: Sequence[str] | None,
-    **given: float | None,
+    **coefficients: float | None,
 ) -> None:
     """Add contact between two sides; see `Study.contact`.
 
-    given: friction, stiffness, depth.
+    coefficients: friction, stiffness, depth.
     """
     if name in definition.blocks:
-        existing = listed(definition.blocks)
+        existing = join_names(definition.blocks)
         raise StudyError(f"contact(name={name!r}): the name is taken; blocks: {existing}")
-    contact, blocks = _contact_and_sides(definition, name, sides, of, given)
+    contact, blocks = _contact_and_sides(definition, name, sides, of, coefficients)
     definition.blocks.update(blocks)
     definition.contacts.append(contact)
 
 
 def _contact_and_sides(
-    definition: Statement,
+    definition: ProblemDefinition,
     name: str,
     sides: tuple[str | Predicate, str | Predicate | None],
     of: Sequence[str] | None,
-    given: Mapping[str, float | None],
+    coefficients: Mapping[str, float | None],
 ) -> tuple[Touch, dict[str, Block]]:
     """A contact and the blocks of its sides.  Raises StudyError, MeshError."""
     mesh, ring = definition.mesh, definition.ring
-    words = f"contact({', '.join(shown(s) for s in sides if s is not None)})"
-    mesh.require_whole(words)
+    context = f"contact({', '.join(display_name(s) for s in sides if s is not None)})"
+    mesh.require_whole(context)
     if mesh.dimension not in KINDS:
-        raise StudyError(f"{words}: contact is for meshes in 2-D and 3-D, this one is a line")
+        raise StudyError(f"{context}: contact is for meshes in 2-D and 3-D, this one is a line")
     usual = tuple(f"u_{axis}" for axis in "xyz"[: mesh.dimension])
     names = usual if of is None else tuple(of)
     if len(names) != len(usual):
-        raise StudyError(f"{words}: of={list(names)}: {len(usual)} displacements are needed")
-    numbers = {k: None if v is None else finite(f"{words}: {k}", v) for k, v in given.items()}
+        raise StudyError(f"{context}: of={list(names)}: {len(usual)} displacements are needed")
+    numbers = {
+        k: None if v is None else finite(f"{context}: {k}", v) for k, v in coefficients.items()
+    }
     for key, value in numbers.items():
         if value is not None and (value < 0.0 if key == "friction" else value <= 0.0):
-            least = "at least 0" if key == "friction" else "positive"
-            raise StudyError(f"{words}: {key} = {value:g}, must be {least}")
+            requirement = "at least 0" if key == "friction" else "positive"
+            raise StudyError(f"{context}: {key} = {value:g}, must be {requirement}")
     side, other = sides
-    mine = mesh.outer_faces(side)
-    theirs = mine if other is None or other == side else mesh.outer_faces(other)
-    alone = theirs is mine
-    for kind in (*mine, *theirs):
+    side_faces = mesh.outer_faces(side)
+    other_faces = side_faces if other is None or other == side else mesh.outer_faces(other)
+    alone = other_faces is side_faces
+    for kind in (*side_faces, *other_faces):
         if kind not in KINDS[mesh.dimension]:
-            raise StudyError(f"{words}: {kind} cannot touch; {listed(KINDS[mesh.dimension])} can")
+            raise StudyError(
+                f"{context}: {kind} cannot touch; {join_names(KINDS[mesh.dimension])} can"
+            )
     if alone:
-        mine = theirs = {k: _in_order(mesh, faces) for k, faces in mine.items()}
+        side_faces = other_faces = {k: _in_order(mesh, faces) for k, faces in side_faces.items()}
     blocks = {}
-    for kind, faces in mine.items():
-        label = name if len(mine) == 1 else f"{name}:{kind}"
+    for kind, faces in side_faces.items():
+        label = name if len(side_faces) == 1 else f"{name}:{kind}"
         blocks[label] = _block(mesh, name, label, (kind, faces), names, float(ring))
     friction, stiffness, depth = (numbers[k] for k in ("friction", "stiffness", "depth"))
-    faces_of = (*theirs.items(),)
-    found = Touch(name, (*blocks,), faces_of, names, friction or 0.0, ring, alone, stiffness, depth)
-    return found, blocks
+    faces_of = (*other_faces.items(),)
+    contact = Touch(
+        name, (*blocks,), faces_of, names, friction or 0.0, ring, alone, stiffness, depth
+    )
+    return contact, blocks
 
 
 def _in_order(mesh: Mesh, faces: Integers) -> Integers:
@@ -127,7 +133,7 @@ def _block(
 ) -> Block:
     family = "mortar" if mesh.dimension == 2 else "touch"
     kernel = load_kernel(f"{family}_side_{len(CELLS[elements[0]].nodes)}")
-    given = {"rho": 1.0, "ring": ring} if mesh.dimension == 2 else {"rho": 1.0}
-    told = {f"u_{axis}": name for axis, name in zip("xyz", names, strict=False)}
-    told |= {m: f"{name}:{m}" for m in MULTIPLIERS[mesh.dimension]}
-    return page_on(mesh, label, kernel, elements, Form(called=told), given)
+    side_data = {"rho": 1.0, "ring": ring} if mesh.dimension == 2 else {"rho": 1.0}
+    study_names = {f"u_{axis}": name for axis, name in zip("xyz", names, strict=False)}
+    study_names |= {m: f"{name}:{m}" for m in MULTIPLIERS[mesh.dimension]}
+    return page_on(mesh, label, kernel, elements, Form(called=study_names), side_data)

@@ -9,17 +9,17 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.definition.argument_checks import datum, known, parameter
+from softehl.runtime.definition.argument_checks import datum, parameter, require_names
 from softehl.runtime.definition.kernel_loading import Origin
 from softehl.runtime.definition.line_fields import interpolated, placed, require_apart
-from softehl.runtime.definition.problem_definition import Block, Form, Statement, StudyError
+from softehl.runtime.definition.problem_definition import Block, Form, ProblemDefinition, StudyError
 from softehl.runtime.discretisation.dofmap import Slot, slots
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.kernels.kernel_call import Rule
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.interior_facets import cells_at_side, interior
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
-from softehl.runtime.suggestions import listed
+from softehl.runtime.suggestions import join_names
 
 GEOMETRIES = {1: ("solid",), 2: ("plane strain", "axisymmetric"), 3: ("solid",)}
 """Geometries of meshes by their dimension, the default first."""
@@ -59,8 +59,8 @@ def wants_traces(error: BaseException | None) -> bool:
 
 def beside_of(mesh: Mesh, on: str | Predicate) -> tuple[str, ...]:
     """Kinds of facets of a side with the cells beside it, of those cells that have faces there."""
-    there = mesh.outer_faces(on)
-    return tuple(f"{k}_side" for k in mesh.cells if there.keys() & set(CELLS[k].faces))
+    side_faces = mesh.outer_faces(on)
+    return tuple(f"{k}_side" for k in mesh.cells if side_faces.keys() & set(CELLS[k].faces))
 
 
 def elements_of(mesh: Mesh, name: str, kernel: Kernel, on: On, cells: str | None) -> Elements:
@@ -68,7 +68,7 @@ def elements_of(mesh: Mesh, name: str, kernel: Kernel, on: On, cells: str | None
     if on is not None and cells is not None:
         raise StudyError(f"{name!r}: give cells=... or on=..., not both")
     if isinstance(on, np.ndarray):
-        return "point1", _listed(mesh, name, kernel, on)
+        return "point1", _elements_by_nodes(mesh, name, kernel, on)
     if on is not None and kernel.nodes == 1:
         return "point1", mesh.own(mesh.nodes(on))[:, None]
     stem, _, facet = kernel.cell.partition("_")
@@ -80,21 +80,21 @@ def elements_of(mesh: Mesh, name: str, kernel: Kernel, on: On, cells: str | None
         assert on is not None
         nodes = interior(mesh, stem) if facet == "interior" else cells_at_side(mesh, on, stem)
         return CELLS[stem].side_nodes[0][0].name, nodes
-    there = _faces(mesh, on, kernel) if on is not None else mesh.cells_of(cells)
-    if kernel.cell in there:
-        return kernel.cell, there[kernel.cell]
-    fit = {kind: nodes for kind, nodes in there.items() if nodes.shape[1] == kernel.nodes}
-    if len(fit) != 1 or (cells is None and len(there) > 1):
-        kinds = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in there.items())
-        place = "the mesh" if on is None and cells is None else repr(cells or on)
+    candidates = _faces(mesh, on, kernel) if on is not None else mesh.cells_of(cells)
+    if kernel.cell in candidates:
+        return kernel.cell, candidates[kernel.cell]
+    fit = {kind: nodes for kind, nodes in candidates.items() if nodes.shape[1] == kernel.nodes}
+    if len(fit) != 1 or (cells is None and len(candidates) > 1):
+        kinds = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in candidates.items())
+        location = "the mesh" if on is None and cells is None else repr(cells or on)
         raise StudyError(
-            f"{name!r}: {kernel.name} has {kernel.nodes} nodes, {place} has {kinds}"
-            + ("; name groups of cells of one kind" if len(there) > 1 else "")
+            f"{name!r}: {kernel.name} has {kernel.nodes} nodes, {location} has {kinds}"
+            + ("; name groups of cells of one kind" if len(candidates) > 1 else "")
         )
     return next(iter(fit.items()))
 
 
-def _listed(mesh: Mesh, name: str, kernel: Kernel, nodes: Integers) -> Integers:
+def _elements_by_nodes(mesh: Mesh, name: str, kernel: Kernel, nodes: Integers) -> Integers:
     """Elements that are given by their nodes (n, k); (n, 0) for a page that knows of none.
 
     Raises StudyError.
@@ -117,56 +117,62 @@ def page_on(
     kernel: Kernel,
     elements: Elements,
     form: Form,
-    given: Mapping[str, Any],
+    arguments: Mapping[str, Any],
 ) -> Block:
     """A block of elements with everything its page needs.  Raises StudyError."""
     kind, nodes = elements
     _require_fit(mesh, kernel)
-    found = slots(kernel)
-    known("unknown", form.shared, [s.name for s in found if s.node is None], kernel.name)
-    known("unknown", form.called, [s.name for s in found] + interpolated(kernel), kernel.name)
-    told = tuple(Slot(form.called.get(s.name, s.name), s.node) for s in found)
+    page_slots = slots(kernel)
+    require_names(
+        "unknown", form.shared, [s.name for s in page_slots if s.node is None], kernel.name
+    )
+    require_names(
+        "unknown", form.called, [s.name for s in page_slots] + interpolated(kernel), kernel.name
+    )
+    study_slots = tuple(Slot(form.called.get(s.name, s.name), s.node) for s in page_slots)
     form = replace(form, shared=frozenset(form.called.get(s, s) for s in form.shared))
-    previous, rates, accelerations = _automatic(kernel, found, told)
-    told, form = placed(name, kernel, len(nodes), told, form)
+    previous, rates, accelerations = _automatic(kernel, page_slots, study_slots)
+    study_slots, form = placed(name, kernel, len(nodes), study_slots, form)
     at_nodes = _nodal_data(kernel)
-    known("argument", given, [*at_nodes, *_arguments(kernel)], kernel.name)
-    given = _by_node(mesh, name, nodes, at_nodes, given)
+    require_names("argument", arguments, [*at_nodes, *_arguments(kernel)], kernel.name)
+    arguments = _by_node(mesh, name, nodes, at_nodes, arguments)
     timed = {"rate": rates, "acceleration": accelerations}
     automatic = ("dt", *(p for p, slots_of in timed.items() if slots_of))
     for parameter_of_time in automatic[1:]:
-        if parameter_of_time in given:
+        if parameter_of_time in arguments:
             raise StudyError(
                 f"{name!r}: {parameter_of_time} comes from the steps in time, it cannot be given"
             )
     filled = {**previous, **rates, **accelerations}
     needed = [p for p in kernel.parameters if p not in automatic]
     needed += [d for d in kernel.data if d not in filled]
-    missing = [a for a in needed if a not in given]
-    for whole, labels in at_nodes.items():
+    missing = [a for a in needed if a not in arguments]
+    for common_name, labels in at_nodes.items():
         if set(labels) <= set(missing):
-            missing = [whole if a == labels[0] else a for a in missing if a not in labels[1:]]
+            missing = [common_name if a == labels[0] else a for a in missing if a not in labels[1:]]
     if missing:
         hint = "; where t is the time or load factor, give t=lambda t: t" if "t" in missing else ""
         raise StudyError(f"{name!r}: {kernel.name} needs {', '.join(missing)}{hint}")
-    own = facet_nodes(kernel)
+    facet = facet_nodes(kernel)
     nowhere = np.full((len(nodes), mesh.dimension), np.nan)
-    around = nodes if own is None else nodes[:, own]
+    around = nodes if facet is None else nodes[:, facet]
     centres = mesh.points[around].mean(axis=1) if around.size else nowhere
-    data = {d: datum(name, d, given[d], centres) for d in kernel.data if d in given}
+    data = {d: datum(name, d, arguments[d], centres) for d in kernel.data if d in arguments}
     return Block(
         name=name,
         kernel=kernel,
         nodes=nodes,
         kind=kind,
-        slots=told,
+        slots=study_slots,
         form=form,
         data=data,
         previous={d: s for d, s in previous.items() if d not in data},
         rates={d: s for d, s in rates.items() if d not in data},
         accelerations={d: s for d, s in accelerations.items() if d not in data},
-        initial=_initial(name, kernel, given, centres, form.rule),
-        parameters={p: parameter(name, p, given[p]) for p in kernel.parameters if p in given},
+        initial=_initial(name, kernel, arguments, centres, form.rule),
+        parameters={
+            p: parameter(name, p, arguments[p]) for p in kernel.parameters if p in arguments
+        },
     )
 
 
@@ -190,13 +196,13 @@ def _arguments(kernel: Kernel) -> list[str]:
 
 def _nodal_data(kernel: Kernel) -> dict[str, list[str]]:
     """Data that there are for each node of an element, D1, D2, ..., by their common name D."""
-    found = {}
+    labels_of = {}
     for label in kernel.data:
         if label.endswith("1") and label[:-1].isidentifier():
             labels = [f"{label[:-1]}{node + 1}" for node in range(kernel.nodes)]
             if kernel.nodes > 1 and set(labels) <= set(kernel.data):
-                found[label[:-1]] = labels
-    return found
+                labels_of[label[:-1]] = labels
+    return labels_of
 
 
 def _by_node(
@@ -204,29 +210,29 @@ def _by_node(
     block: str,
     nodes: Integers,
     at_nodes: Mapping[str, Sequence[str]],
-    given: Mapping[str, Any],
+    arguments: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Data as the kernel calls them, where nodal ones are given by their common name: a number, one
     for each node of the mesh, or a function of the places of nodes.  Raises StudyError.
     """
-    found = dict(given)
-    for name in at_nodes.keys() & given.keys():
-        twice = [label for label in at_nodes[name] if label in given]
+    kernel_data = dict(arguments)
+    for name in at_nodes.keys() & arguments.keys():
+        twice = [label for label in at_nodes[name] if label in arguments]
         if twice:
             raise StudyError(f"{block!r}: {name!r} and {twice[0]!r}: the same data twice")
-        values = datum(block, name, found.pop(name), mesh.points)
-        found |= {label: values[nodes[:, k]] for k, label in enumerate(at_nodes[name])}
-    return found
+        values = datum(block, name, kernel_data.pop(name), mesh.points)
+        kernel_data |= {label: values[nodes[:, k]] for k, label in enumerate(at_nodes[name])}
+    return kernel_data
 
 
 def _automatic(
-    kernel: Kernel, found: Sequence[Slot], told: Sequence[Slot]
+    kernel: Kernel, page_slots: Sequence[Slot], study_slots: Sequence[Slot]
 ) -> list[dict[str, Slot]]:
     """Data u_old1, u_rate1, u_acceleration1, ... of nodal unknowns u: what a study fills itself.
 
-    found: unknowns as the page calls them; told: as the study does.
+    page_slots: unknowns as the page calls them; study_slots: as the study does.
     """
-    pairs = zip(found, told, strict=True)
+    pairs = zip(page_slots, study_slots, strict=True)
     nodal = {f"{s.name}{{}}{s.node + 1}": ours for s, ours in pairs if s.node is not None}
     tables = [
         {label.format(suffix): slot for label, slot in nodal.items()}
@@ -236,12 +242,12 @@ def _automatic(
 
 
 def _initial(
-    block: str, kernel: Kernel, given: Mapping[str, Any], centres: Array, rule: Rule | None
+    block: str, kernel: Kernel, arguments: Mapping[str, Any], centres: Array, rule: Rule | None
 ) -> Array | None:
     """Point data at the start, (n, points, k): numbers or functions of the centres, else zero."""
     if not kernel.point_data:
         return None
-    columns = [datum(block, name, given.get(name, 0.0), centres) for name in kernel.point_data]
+    columns = [datum(block, name, arguments.get(name, 0.0), centres) for name in kernel.point_data]
     points = len((rule or kernel.default_rule).weights)
     return np.repeat(np.stack(columns, axis=1)[:, None, :], points, axis=1)
 
@@ -250,11 +256,12 @@ def geometry_of(mesh: Mesh, geometry: str | None) -> str:
     """The geometry of a mesh (None: the usual one).  Raises StudyError for one it cannot have."""
     allowed = GEOMETRIES[mesh.dimension]
     if geometry is not None and geometry not in allowed:
-        words = " or ".join(f'"{g}"' for g in allowed)
+        allowed_names = " or ".join(f'"{g}"' for g in allowed)
         stress = "stress" in str(geometry) and mesh.dimension == 2
         advice = "; plane stress is said on a page: docs/fields.md#plane-stress" if stress else ""
         raise StudyError(
-            f"geometry = {geometry!r} of a mesh in {mesh.dimension}-D: allowed is {words}{advice}"
+            f"geometry = {geometry!r} of a mesh in {mesh.dimension}-D: allowed is "
+            f"{allowed_names}{advice}"
         )
     return geometry or allowed[0]
 
@@ -269,7 +276,7 @@ def form_of(
 ) -> Form:
     """The form of a page on the elements of block `name`.  Raises StudyError."""
     names = _mapping(name, "called", called, '{"u": "u_x"}')
-    if not all(isinstance(said, str) for said in names.values()):
+    if not all(isinstance(name_in_study, str) for name_in_study in names.values()):
         raise StudyError(f'{name!r}: called = {names}: names are text, as in called={{"u": "u_x"}}')
     fields = _mapping(name, "along", along, '{"p": 2}')
     orders = {n: int(g) if isinstance(g, np.integer) else g for n, g in fields.items()}
@@ -279,55 +286,55 @@ def form_of(
 
 def elements_on(name: str, on: Any) -> On:
     """A side, or node numbers as an array, which may be given as lists.  Raises StudyError."""
-    given: On = on
+    side_or_nodes: On = on
     if isinstance(on, np.ma.MaskedArray):
         raise StudyError(f"{name!r}: on is a masked array, whose mask says nothing here")
     if not isinstance(on, list | tuple):
-        return given
+        return side_or_nodes
     try:
         return np.array(on)
     except ValueError:
         raise StudyError(f"{name!r}: on = {on}: elements have the same number of nodes") from None
 
 
-def _mapping(name: str, word: str, given: Any, example: str) -> Mapping[str, Any]:
-    if given is None or isinstance(given, Mapping):
-        return dict(given or {})
-    raise StudyError(f"{name!r}: {word} = {given!r}: a dict is needed, as in {word}={example}")
+def _mapping(name: str, word: str, value: Any, example: str) -> Mapping[str, Any]:
+    if value is None or isinstance(value, Mapping):
+        return dict(value or {})
+    raise StudyError(f"{name!r}: {word} = {value!r}: a dict is needed, as in {word}={example}")
 
 
-def _rule(name: str, given: Any) -> Rule | None:
+def _rule(name: str, rule: Any) -> Rule | None:
     """A rule of quadrature as numbers, also one of a page."""
-    if given is None or isinstance(given, Rule):
-        return given
-    if not callable(getattr(given, "rows", None)):
+    if rule is None or isinstance(rule, Rule):
+        return rule
+    if not callable(getattr(rule, "rows", None)):
         raise StudyError(
-            f"{name!r}: rule = {given!r}: a rule is needed, as in "
+            f"{name!r}: rule = {rule!r}: a rule is needed, as in "
             "rule=softehl.quadrature.gauss(4, 1)"
         )
-    rows = np.array(given.rows(), dtype=np.float64)
+    rows = np.array(rule.rows(), dtype=np.float64)
     return Rule(rows[:, :-1].copy(), rows[:, -1].copy())
 
 
 def add_block(
-    definition: Statement,
+    definition: ProblemDefinition,
     name: str,
     origin: Origin,
     form: Form,
     *,
     on: On,
     cells: str | None,
-    given: Mapping[str, Any],
+    arguments: Mapping[str, Any],
 ) -> None:
     """Add elements of a page, a block for each kind of cell; see `Study.add`."""
     blocks = definition.blocks
     if name in blocks:
-        raise StudyError(f"block {name!r} is there already; blocks: {listed(blocks)}")
+        raise StudyError(f"block {name!r} is there already; blocks: {join_names(blocks)}")
     kernels = _kernels(definition.mesh, origin, on, cells)
     for kernel in kernels:
         label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"
         elements = elements_of(definition.mesh, label, kernel, on, cells)
-        block = page_on(definition.mesh, label, kernel, elements, form, given)
+        block = page_on(definition.mesh, label, kernel, elements, form, arguments)
         require_apart(block, blocks.values())
         blocks[label] = replace(block, differentiated=origin.differentiated(kernel))
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from softehl.runtime.arrays import Integers
-from softehl.runtime.definition.argument_checks import known
+from softehl.runtime.definition.argument_checks import require_names
 from softehl.runtime.definition.problem_definition import Block, Form, StudyError
 from softehl.runtime.discretisation.dofmap import Slot
 from softehl.runtime.discretisation.quadrature import (
@@ -19,7 +19,7 @@ from softehl.runtime.discretisation.quadrature import (
     several,
 )
 from softehl.runtime.kernels.kernel import Kernel, Rule
-from softehl.runtime.suggestions import listed
+from softehl.runtime.suggestions import join_names
 
 
 def placed(
@@ -32,24 +32,29 @@ def placed(
     the element ("p:1", ...). An unknown of an element may be the one at a place of a field of other
     elements. Raises StudyError.
     """
-    own = [s for s in slots if s.node is None and s.name in form.along]
-    rest, standing = tuple(s for s in slots if s not in own), [s.name for s in own]
+    element_slots = [s for s in slots if s.node is None and s.name in form.along]
+    node_slots, standing = (
+        tuple(s for s in slots if s not in element_slots),
+        [s.name for s in element_slots],
+    )
     names = [name for name in form.along if name not in standing]
-    if bool(names) != bool(kernel.interpolated) or (*rest, *own) != tuple(slots):
-        has = kernel.interpolated or listed([s.name for s in slots if s.node is None])
+    if bool(names) != bool(kernel.interpolated) or (*node_slots, *element_slots) != tuple(slots):
+        has = kernel.interpolated or join_names([s.name for s in slots if s.node is None])
         example = f", as in along={{{kernel.interpolated!r}: 2}}" if kernel.interpolated else ""
         raise StudyError(
-            f"{block!r}: along = {listed(form.along)}; {kernel.name} has {has} along "
+            f"{block!r}: along = {join_names(form.along)}; {kernel.name} has {has} along "
             f"its elements{example}"
         )
     renamed = [form.called[name] for name in interpolated(kernel) if name in form.called]
-    known("field", renamed, form.along, f"{block!r}: along")
+    require_names("field", renamed, form.along, f"{block!r}: along")
     orders = _orders(block, kernel, form)
     names = list(orders) or names
     along = [f for name, order in orders.items() for f in _by_order(name, order)]
-    places = {} if orders else {n: _places(block, n, count, form.along[n]) for n in form.along}
-    places = {name: places[name] for name in (*standing, *names) if name in places}
-    widths = [orders[n] + 1 if orders else places[n].shape[1] for n in names]
+    dof_tables = (
+        {} if orders else {n: _dof_table(block, n, count, form.along[n]) for n in form.along}
+    )
+    dof_tables = {name: dof_tables[name] for name in (*standing, *names) if name in dof_tables}
+    widths = [orders[n] + 1 if orders else dof_tables[n].shape[1] for n in names]
     rule = form.rule
     if names and (rule is None or rule.basis is None):
         rule = _rule(block, kernel, [w - 1 for w in widths], rule)
@@ -59,7 +64,7 @@ def placed(
             f"{block!r}: an element has {sum(widths)} unknowns along it, the rule {functions} "
             "functions"
         )
-    return (*rest, *along), replace(form, along=places, rule=rule)
+    return (*node_slots, *along), replace(form, along=dof_tables, rule=rule)
 
 
 def interpolated(kernel: Kernel) -> list[str]:
@@ -81,7 +86,7 @@ def require_apart(block: Block, others: Iterable[Block]) -> None:
 
 
 def _lines(block: Block) -> set[tuple[int, ...]]:
-    return {tuple(sorted(ends)) for ends in block.nodes[:, :2].tolist()}
+    return {tuple(sorted(end_nodes)) for end_nodes in block.nodes[:, :2].tolist()}
 
 
 def _by_order(name: str, order: int) -> tuple[Slot, ...]:
@@ -99,8 +104,8 @@ def _orders(block: str, kernel: Kernel, form: Form) -> dict[str, int]:
     orders = {n: int(given) for n, given in along.items() if isinstance(given, int | np.integer)}
     if orders and (len(orders) < len(along) or kernel.nodes < 2):
         raise StudyError(
-            f"{block!r}: along = {listed(along)}: orders for all of them, on lines of 2 nodes or "
-            "more, or places for all of them"
+            f"{block!r}: along = {join_names(along)}: orders for all of them, on lines of 2 nodes "
+            "or more, or places for all of them"
         )
     for name, order in orders.items():
         if order < 1:
@@ -108,11 +113,11 @@ def _orders(block: str, kernel: Kernel, form: Form) -> dict[str, int]:
     fields = [form.called.get(name, name) for name in interpolated(kernel)]
     if (form.rule and form.rule.basis is not None) or len(orders) != len(fields):
         return orders
-    known("field", orders, fields, kernel.name)
+    require_names("field", orders, fields, kernel.name)
     return {name: orders[name] for name in fields}
 
 
-def _rule(block: str, kernel: Kernel, orders: Sequence[int], given: Rule | None) -> Rule:
+def _rule(block: str, kernel: Kernel, orders: Sequence[int], rule: Rule | None) -> Rule:
     """Lagrange polynomials of these orders at the points of a rule.
 
     Left out, they are Gauss points which integrate products of them.
@@ -122,7 +127,7 @@ def _rule(block: str, kernel: Kernel, orders: Sequence[int], given: Rule | None)
             f"{block!r}: {kernel.name} interpolates {kernel.interpolated}: give an order for each "
             "of them, or the rule with their shape functions, rule=..."
         )
-    at = given or gauss(automatic_points(max(orders), "gauss"))
+    at = rule or gauss(automatic_points(max(orders), "gauss"))
     if at.points.shape[1:] != (1,):
         raise StudyError(
             f"{block!r}: the rule has points of {at.points.shape[1]} coordinates; a line has 1"
@@ -132,14 +137,14 @@ def _rule(block: str, kernel: Kernel, orders: Sequence[int], given: Rule | None)
     return rules[0] if len(rules) == 1 else several(*rules)
 
 
-def _places(block: str, name: str, count: int, given: int | Integers) -> Integers:
+def _dof_table(block: str, name: str, count: int, table: int | Integers) -> Integers:
     """Places (n, m) of a field, counted from 0.  Raises StudyError."""
-    places = np.asarray(given)
-    if places.dtype.kind not in "iu" or places.ndim != 2 or len(places) != count:
+    numbers = np.asarray(table)
+    if numbers.dtype.kind not in "iu" or numbers.ndim != 2 or len(numbers) != count:
         raise StudyError(
             f"{block!r}: along {name!r}: an order, or numbers of places ({count}, m); given "
-            f"{places.dtype} of shape {places.shape}"
+            f"{numbers.dtype} of shape {numbers.shape}"
         )
-    if places.size and places.min() < 0:
+    if numbers.size and numbers.min() < 0:
         raise StudyError(f"{block!r}: along {name!r}: places are counted from 0")
-    return places
+    return numbers

@@ -12,24 +12,24 @@ from softehl.runtime.definition.problem_definition import (
     Condition,
     Datum,
     Force,
+    ProblemDefinition,
     Start,
-    Statement,
     StudyError,
     Where,
-    shown,
+    display_name,
 )
 from softehl.runtime.discretisation.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Predicate
 
 
-def add_load(definition: Statement, where: Where, components: Mapping[str, Amount]) -> None:
+def add_load(definition: ProblemDefinition, where: Where, components: Mapping[str, Amount]) -> None:
     """Add dead loads or nodal forces; see `Study.load`."""
     mesh = definition.mesh
-    words = f"load({shown(where)})"
-    read.named(words, components, "u_x=1")
-    for name, given in components.items():
-        value = read.amount(words, name, given)
+    context = f"load({display_name(where)})"
+    read.require_unknowns(context, components, "u_x=1")
+    for name, component in components.items():
+        value = read.amount(context, name, component)
         if isinstance(where, str) or callable(where):
             for kind, faces in mesh.faces(where).items():
                 kernel = DeadLoad(CELLS[kind], value, definition.ring)
@@ -40,16 +40,16 @@ def add_load(definition: Statement, where: Where, components: Mapping[str, Amoun
 
 
 def add_pressure(
-    definition: Statement, where: str | Predicate, value: Amount, of: Sequence[str] | None
+    definition: ProblemDefinition, where: str | Predicate, value: Amount, of: Sequence[str] | None
 ) -> None:
     """Add a follower pressure; see `Study.pressure`."""
     mesh = definition.mesh
-    value = read.amount(f"pressure({shown(where)})", "pressure", value)
+    value = read.amount(f"pressure({display_name(where)})", "pressure", value)
     axes = "xyz"[: mesh.dimension]
     names = tuple(f"u_{axis}" for axis in axes) if of is None else tuple(of)
     if len(names) != mesh.dimension or len(names) == 1:
         raise StudyError(
-            f"pressure({shown(where)}, of={list(names)}): a displacement for each of "
+            f"pressure({display_name(where)}, of={list(names)}): a displacement for each of "
             f"{mesh.dimension} coordinates is needed, in 2-D or 3-D"
         )
     for kind, faces in mesh.outer_faces(where).items():
@@ -57,29 +57,33 @@ def add_pressure(
         _add_force(definition, "pressure", where, kernel, faces, names)
 
 
-def add_springs(definition: Statement, where: Where, stiffness: Mapping[str, float]) -> None:
+def add_springs(
+    definition: ProblemDefinition, where: Where, stiffness: Mapping[str, float]
+) -> None:
     """Add springs to the ground; see `Study.spring`."""
     mesh = definition.mesh
-    read.named(f"spring({shown(where)})", stiffness, "u_x=2")
+    read.require_unknowns(f"spring({display_name(where)})", stiffness, "u_x=2")
     for name, value in stiffness.items():
         kernel = Spring(read.finite(name, value))
         nodes = mesh.own(read.nodes_of(mesh, where))
         _add_force(definition, "spring", where, kernel, nodes[:, None], (name,))
 
 
-def add_conditions(definition: Statement, where: Where, values: Mapping[str, Amount]) -> None:
+def add_conditions(
+    definition: ProblemDefinition, where: Where, values: Mapping[str, Amount]
+) -> None:
     """Prescribe unknowns at nodes; see `Study.fix`."""
     mesh = definition.mesh
-    words = f"fix({shown(where)})"
-    read.named(words, values, "u_x=0")
-    for name, given in values.items():
-        value = read.amount(words, name, given)
+    context = f"fix({display_name(where)})"
+    read.require_unknowns(context, values, "u_x=0")
+    for name, prescribed in values.items():
+        value = read.amount(context, name, prescribed)
         condition = Condition(where, read.nodes_of(mesh, where), name, value)
         definition.conditions.append(condition)
 
 
 def add_ties(
-    definition: Statement,
+    definition: ProblemDefinition,
     where: Where,
     to: Where,
     names: tuple[str, ...],
@@ -89,44 +93,46 @@ def add_ties(
 ) -> None:
     """Tie unknowns of one side to those of another; see `Study.tie`."""
     mesh = definition.mesh
-    words = f"tie({shown(where)}, {shown(to)})"
-    mesh.require_whole(words)
-    read.named(words, names, f'tie({shown(where)}, {shown(to)}, "u_x", "u_y")')
-    offset = read.amount(words, "offset", offset)
-    ours, theirs = read.nodes_of(mesh, where), read.nodes_of(mesh, to)
-    if len(theirs) == 1 < len(ours):
+    context = f"tie({display_name(where)}, {display_name(to)})"
+    mesh.require_whole(context)
+    read.require_unknowns(
+        context, names, f'tie({display_name(where)}, {display_name(to)}, "u_x", "u_y")'
+    )
+    offset = read.amount(context, "offset", offset)
+    side_nodes, partner_nodes = read.nodes_of(mesh, where), read.nodes_of(mesh, to)
+    if len(partner_nodes) == 1 < len(side_nodes):
         if offset == 0.0:
-            ours = ours[ours != theirs[0]]  # a node of the side itself
-        if theirs[0] in ours:
-            raise StudyError(f"{words}: the place is a node of the side: offset must be 0")
-        partners = np.repeat(theirs, len(ours))
-    elif len(ours) != len(theirs):
+            side_nodes = side_nodes[side_nodes != partner_nodes[0]]  # a node of the side itself
+        if partner_nodes[0] in side_nodes:
+            raise StudyError(f"{context}: the place is a node of the side: offset must be 0")
+        partners = np.repeat(partner_nodes, len(side_nodes))
+    elif len(side_nodes) != len(partner_nodes):
         raise StudyError(
-            f"{words}: {len(ours)} and {len(theirs)} nodes; sides of equal nodes but for a "
-            "shift are tied, or a side to one place"
+            f"{context}: {len(side_nodes)} and {len(partner_nodes)} nodes; sides of equal nodes "
+            "but for a shift are tied, or a side to one place"
         )
     else:
-        partners = read.node_partners(mesh, ours, theirs, tolerance)
+        partners = read.node_partners(mesh, side_nodes, partner_nodes, tolerance)
     for name in names:
-        pairs = np.stack([ours, partners], axis=1)
+        pairs = np.stack([side_nodes, partners], axis=1)
         _add_force(definition, "tie", where, Tie(offset), pairs, (name,))
 
 
 def add_initial_values(
-    definition: Statement, where: Where | None, values: Mapping[str, Datum]
+    definition: ProblemDefinition, where: Where | None, values: Mapping[str, Datum]
 ) -> None:
     """Set initial values of unknowns; see `Study.start`."""
     mesh = definition.mesh
-    read.named("start()", values, "T=20")
+    read.require_unknowns("start()", values, "T=20")
     everywhere = np.arange(len(mesh.points))
     nodes = everywhere if where is None else read.nodes_of(mesh, where)
     for name, value in values.items():
-        found = read.datum("start", name, value, mesh.points[nodes])
-        definition.start.append(Start(name, nodes, found))
+        at_nodes = read.datum("start", name, value, mesh.points[nodes])
+        definition.start.append(Start(name, nodes, at_nodes))
 
 
 def _add_force(
-    definition: Statement,
+    definition: ProblemDefinition,
     what: str,
     where: Where,
     kernel: DeadLoad | NodalForce | Pressure | Spring | Tie,
@@ -134,6 +140,6 @@ def _add_force(
     names: tuple[str, ...],
 ) -> None:
     forces = definition.forces
-    label = f"{what} {len(forces) + 1}: {what}({shown(where)}, {', '.join(names)})"
-    place = where if isinstance(where, str) else shown(where)
-    forces.append(Force(label, kernel, nodes, names, what, place))
+    label = f"{what} {len(forces) + 1}: {what}({display_name(where)}, {', '.join(names)})"
+    location = where if isinstance(where, str) else display_name(where)
+    forces.append(Force(label, kernel, nodes, names, what, location))

@@ -45,7 +45,7 @@ class Form:
     constant: bool = False
 
     @property
-    def places(self) -> dict[str, Integers]:
+    def dof_tables(self) -> dict[str, Integers]:
         """Places (n, m) of the fields along the elements, without those that are orders still."""
         return {name: p for name, p in self.along.items() if not isinstance(p, int | np.integer)}
 
@@ -97,9 +97,9 @@ class Condition:
     value: Amount
 
     @property
-    def words(self) -> str:
+    def call(self) -> str:
         """The request in words, for messages."""
-        return f"fix({shown(self.where)}, {self.name}=...)"
+        return f"fix({display_name(self.where)}, {self.name}=...)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ class Start:
 
 
 @dataclass(eq=False)
-class Statement:
+class ProblemDefinition:
     """A boundary-value problem that is being written down, in the order of the script.
 
     ring: whether cells and sides are those of rings around the x axis.
@@ -141,12 +141,12 @@ class Statement:
     start: list[Start] = field(default_factory=list)
     contacts: list[Any] = field(default_factory=list)
 
-    def copied(self) -> Statement:
+    def copy(self) -> ProblemDefinition:
         """A copy, to which more can be added."""
-        own: dict[str, Any] = {
+        containers: dict[str, Any] = {
             n: copy(v) for n, v in vars(self).items() if isinstance(v, dict | list)
         }
-        return replace(self, **own)
+        return replace(self, **containers)
 
     @property
     def count(self) -> int:
@@ -159,7 +159,7 @@ class Statement:
         return np.concatenate([np.empty(0, dtype=np.int64), *parts])
 
 
-def shown(where: object) -> str:
+def display_name(where: object) -> str:
     """A place that was meant, for messages."""
     if callable(where):
         return getattr(where, "__name__", "predicate")

@@ -18,7 +18,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.problem_checks import not_finite, require_sound_elements
 from softehl.runtime.discretisation.sparsity import Pattern, Structure
-from softehl.runtime.suggestions import few
+from softehl.runtime.suggestions import short_list
 
 _SETS = 4  # sets of prescribed unknowns that are remembered
 
@@ -75,7 +75,9 @@ class Assembler:
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        return f"<Assembler: {self.size} unknowns; blocks: {few(b.name for b in self.blocks)}>"
+        return (
+            f"<Assembler: {self.size} unknowns; blocks: {short_list(b.name for b in self.blocks)}>"
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """For `copy` and `pickle`: without what only saves time."""

@@ -33,7 +33,7 @@ from softehl.runtime.discretisation.residual_norm import (
     residual_norm,
 )
 from softehl.runtime.discretisation.step_bounds import Guard
-from softehl.runtime.suggestions import few, listed
+from softehl.runtime.suggestions import join_names, short_list
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,9 @@ class Problem:
             )
         missing = [name for name in self.layout.names if name not in self.scales]
         if self.absolute and missing:
-            raise ProblemError(f"absolute scales: {listed(missing)} has none; give one for each")
+            raise ProblemError(
+                f"absolute scales: {join_names(missing)} has none; give one for each"
+            )
         ordered = {n: in_order(self.assembler.block(n), v) for n, v in self.parameters.items()}
         object.__setattr__(self, "parameters", ordered)
         self._require_prescribed()
@@ -95,8 +97,9 @@ class Problem:
     def __repr__(self) -> str:
         """Summary in one line."""
         return (
-            f"<{type(self).__name__}: {self.layout.total} unknowns ({few(self.layout.names)}), "
-            f"{len(self.fixed)} prescribed; blocks: {few(self.parameters)}>"
+            f"<{type(self).__name__}: {self.layout.total} unknowns "
+            f"({short_list(self.layout.names)}), "
+            f"{len(self.fixed)} prescribed; blocks: {short_list(self.parameters)}>"
         )
 
     def _require_prescribed(self) -> None:
@@ -587,7 +590,7 @@ class Problem:
         require_known(f"parameter of block {name!r}", values, names)
         if old is None:
             if set(values) != set(names):
-                raise ProblemError(f"block {name!r} is off: give all of {listed(names)}")
+                raise ProblemError(f"block {name!r} is off: give all of {join_names(names)}")
             return in_order(block, values)
         return in_order(block, {**dict(zip(names, old, strict=True)), **values})
 

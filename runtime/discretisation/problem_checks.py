@@ -11,7 +11,7 @@ from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.mesh.cells import CELLS, Cell, jacobians
-from softehl.runtime.suggestions import listed, meant
+from softehl.runtime.suggestions import did_you_mean, join_names
 
 if TYPE_CHECKING:
     from softehl.runtime.discretisation.element_blocks import ElementBlock
@@ -29,7 +29,7 @@ def require_known(what: str, given: Iterable[str], known: Iterable[str]) -> None
     for name in given:
         if name not in allowed:
             raise ProblemError(
-                f"no {what} {name!r}{meant(name, allowed)}; there are {listed(allowed)}"
+                f"no {what} {name!r}{did_you_mean(name, allowed)}; there are {join_names(allowed)}"
             )
 
 
@@ -46,7 +46,7 @@ def in_order(block: ElementBlock, given: Any) -> Array:
     if values.dtype.kind not in "fiu" or values.shape != (len(names),):
         raise ProblemError(
             f"block {block.name!r}: parameters {given!r}, must be {len(names)} numbers "
-            f"({listed(names)})"
+            f"({join_names(names)})"
         )
     values = values.astype(np.float64, copy=False)
     if not np.isfinite(values).all():

@@ -13,13 +13,13 @@ from softehl.runtime.contact.mortar_pair import MortarPairKernel
 from softehl.runtime.contact.search import Contact, ContactSide, StateDependentBlocks
 from softehl.runtime.contact.search_3d import FaceContact
 from softehl.runtime.definition.contact_sides import MULTIPLIERS, Touch
-from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.dofmap import Numbering
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.equations.system import Step, System
 from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS, Cell, measures
-from softehl.runtime.suggestions import listed, meant
+from softehl.runtime.suggestions import did_you_mean, join_names
 
 AnyContact: TypeAlias = Contact | FaceContact
 _SOFTER, _SOFTEST = 0.25, 0.1
@@ -29,7 +29,7 @@ from 0.5 on, of quadratic faces from 0.25 on, sticking and slipping may cycle.""
 _NOTHING = 1e-9  # of the parent face, of order 1: exact shares are 0, or more than a tenth
 
 
-def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> AnyContact:
+def contact_of(statement: ProblemDefinition, numbering: Numbering, touch: Touch) -> AnyContact:
     """The search and the elements of a contact, whose stiffness is not known yet.
 
     Raises StudyError.
@@ -49,7 +49,7 @@ def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> AnyC
         sides.append(ContactSide(block.kind, block.nodes, np.ones(len(reach)), depth, reach))
     kinds = [(s.kind, other) for s in sides for other, _ in touch.others]
     unknowns = [touch.unknown(m) for m in MULTIPLIERS[mesh.dimension]]
-    given = (
+    arguments = (
         touch.name,
         mesh.points,
         np.stack([numbering.nodal[n] for n in touch.names], axis=1),
@@ -60,22 +60,22 @@ def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> AnyC
     if mesh.dimension == 3:
         law = load_kernel("touch")
         pairs = {(a, b): MortarPairKernel(law, CELLS[a], CELLS[b]) for a, b in kinds}
-        return FaceContact(*given, pairs, touch.friction, touch.alone)
+        return FaceContact(*arguments, pairs, touch.friction, touch.alone)
     nodes = {kind: len(CELLS[kind].nodes) for pair in kinds for kind in pair}
     kernels = {(a, b): load_kernel(f"mortar_{nodes[a]}{nodes[b]}") for a, b in kinds}
-    return Contact(*given, kernels, touch.friction, touch.ring, touch.alone)
+    return Contact(*arguments, kernels, touch.friction, touch.ring, touch.alone)
 
 
-def _require_displacements(statement: Statement, touch: Touch) -> None:
+def _require_displacements(statement: ProblemDefinition, touch: Touch) -> None:
     """Raise StudyError for displacements that no page of a body has."""
     contacts = {label for other in statement.contacts for label in other.labels}
     bodies = [block for label, block in statement.blocks.items() if label not in contacts]
-    known = list(dict.fromkeys(s.name for b in bodies for s in b.slots if s.node is not None))
+    existing = list(dict.fromkeys(s.name for b in bodies for s in b.slots if s.node is not None))
     for name in touch.names:
-        if name not in known:
+        if name not in existing:
             raise StudyError(
-                f"{touch.name!r}: no unknown {name!r}{meant(name, known)}; at nodes: "
-                f"{listed(known)}; give of=(...), the displacements along x and y"
+                f"{touch.name!r}: no unknown {name!r}{did_you_mean(name, existing)}; at nodes: "
+                f"{join_names(existing)}; give of=(...), the displacements along x and y"
             )
 
 
@@ -90,7 +90,7 @@ def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
     problem = system.problem(step)
     with np.errstate(all="ignore"):
         stiffness = problem.assembler.linearise(x, problem.parameters)[1].diagonal()
-    assembler, blocks, found = system.assembler, dict(system.blocks), []
+    assembler, blocks, contacts_with_stiffness = system.assembler, dict(system.blocks), []
     for touch in statement.contacts:
         contact = contacts[touch.name]
         rho = [_rho(system, touch, contact, side, stiffness) for side in contact.sides]
@@ -100,16 +100,18 @@ def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
             columns = [data[name] for name in blocks[label].kernel.data]
             assembler = assembler.with_data(label, data=np.stack(columns, axis=1))
         sides = tuple(replace(s, rho=r) for s, r in zip(contact.sides, rho, strict=True))
-        found.append(replace(contact, sides=sides))
-    return replace(system, assembler=assembler, blocks=blocks, contacts=tuple(found))
+        contacts_with_stiffness.append(replace(contact, sides=sides))
+    return replace(
+        system, assembler=assembler, blocks=blocks, contacts=tuple(contacts_with_stiffness)
+    )
 
 
 def contact_blocks(system: System) -> dict[str, float]:
     """Friction of each block of a contact, by name: those of its sides and of its pairs."""
     touches = [] if system.statement is None else system.statement.contacts
-    found = {label: touch.friction for touch in touches for label in touch.labels}
+    friction = {label: touch.friction for touch in touches for label in touch.labels}
     pairs = {b.name: c.friction for c in system.contacts for b in c.empty()}
-    return {**found, **pairs}
+    return {**friction, **pairs}
 
 
 def weighted(
@@ -138,9 +140,14 @@ def _rho(system: System, touch: Touch, contact: AnyContact, side: ContactSide, K
     if touch.stiffness is not None:
         return np.full(len(side.faces), touch.stiffness)
     at_nodes = _per_area(contact, [(side.kind, side.faces)], K)[side.faces]
-    own = at_nodes[:, _loaded(CELLS[side.kind])].mean(axis=1)
-    theirs = _per_area(contact, contact.others, K)
-    rho = np.minimum(own, np.median(theirs[theirs > 0.0]) if (theirs > 0.0).any() else np.inf)
+    side_stiffness = at_nodes[:, _loaded(CELLS[side.kind])].mean(axis=1)
+    other_stiffness = _per_area(contact, contact.others, K)
+    rho = np.minimum(
+        side_stiffness,
+        np.median(other_stiffness[other_stiffness > 0.0])
+        if (other_stiffness > 0.0).any()
+        else np.inf,
+    )
     if not (np.isfinite(rho) & (rho > 0.0)).all():
         raise StudyError(
             f"{touch.name!r}: the bodies have no stiffness at rest; give stiffness=..., about "
@@ -156,18 +163,18 @@ def _per_area(contact: AnyContact, faces: object, K: Array) -> Array:
     for kind, nodes in faces:  # type: ignore[attr-defined]
         ring = isinstance(contact, Contact) and contact.ring
         at, weights = CELLS[kind].measured_rule(CELLS[kind].order, ring=ring)
-        places = contact.points[nodes]
-        density = measures(CELLS[kind], places, at)
+        points = contact.points[nodes]
+        density = measures(CELLS[kind], points, at)
         shape = CELLS[kind].shape(at)
         if ring:
-            density = density * 2.0 * np.pi * np.einsum("qk,nk->nq", shape, places[:, :, 1])
-        shares = np.einsum("nq,q,qk->nk", density, weights, shape)
+            density = density * 2.0 * np.pi * np.einsum("qk,nk->nq", shape, points[:, :, 1])
+        fractions = np.einsum("nq,q,qk->nk", density, weights, shape)
         first = _loaded(CELLS[kind]).start
-        np.add.at(area, nodes[:, first:], shares[:, first:])
-    there = area > 0.0
-    own = np.zeros(len(area))
-    own[there] = K[contact.displacements[there]].mean(axis=1) / area[there]
-    return own
+        np.add.at(area, nodes[:, first:], fractions[:, first:])
+    loaded = area > 0.0
+    per_area = np.zeros(len(area))
+    per_area[loaded] = K[contact.displacements[loaded]].mean(axis=1) / area[loaded]
+    return per_area
 
 
 def _loaded(cell: Cell) -> slice:

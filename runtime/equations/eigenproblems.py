@@ -30,46 +30,46 @@ class SymmetricTangent:
     K: csc_array
 
     @classmethod
-    def at(cls, system: System, posed: Any, x: Array, words: str) -> SymmetricTangent:
+    def at(cls, system: System, distributed: Any, x: Array, context: str) -> SymmetricTangent:
         """Raises StudyError where it is not finite or not symmetric.
 
         That of a contact without friction is symmetric but for the error of its mesh, which changes
         eigenvalues in the second order.
         """
         comm = system.comm
-        problem = comm.local_problem(posed).at(x)
+        problem = comm.local_problem(distributed).at(x)
         with np.errstate(all="ignore"):
             K = problem.assembler.linearise(x, problem.parameters)[1]
         if comm.max(float(not np.isfinite(K.data).all())):
-            raise StudyError(f"{words}: the tangent is not finite")
+            raise StudyError(f"{context}: the tangent is not finite")
         smooth = [name for name, friction in contact_blocks(system).items() if friction == 0.0]
-        whole = K
+        frictional = K
         if smooth:
-            rest = {n: v for n, v in problem.parameters.items() if n not in smooth}
-            whole = problem.assembler.linearise(x, rest)[1]
-        if comm.max(float(not is_symmetric_where_free(problem, whole))):
+            other_parameters = {n: v for n, v in problem.parameters.items() if n not in smooth}
+            frictional = problem.assembler.linearise(x, other_parameters)[1]
+        if comm.max(float(not is_symmetric_where_free(problem, frictional))):
             raise StudyError(
-                f"{words}: the tangent is not symmetric (friction, pressure that follows an open "
+                f"{context}: the tangent is not symmetric (friction, pressure that follows an open "
                 "side, or a page without a potential), and frequencies are those of a potential"
             )
         return cls(problem, K)
 
 
 def natural_modes(
-    system: System, posed: Any, x: Array, count: int, mass: Masses | None
+    system: System, distributed: Any, x: Array, count: int, mass: Masses | None
 ) -> tuple[Array, Array]:
     """Squares of angular frequencies (k,) and modes (k, n) about a state x, the lowest first."""
-    words = f"modes({count})"
-    require_count(words, count)
-    here = SymmetricTangent.at(system, posed, x, words)
-    M = mass_matrix(system, here.problem, x, mass)
+    context = f"modes({count})"
+    require_count(context, count)
+    tangent = SymmetricTangent.at(system, distributed, x, context)
+    M = mass_matrix(system, tangent.problem, x, mass)
     try:
-        return system.comm.lowest_modes(here.problem, here.K, M, count)
+        return system.comm.lowest_modes(tangent.problem, tangent.K, M, count)
     except (NoModes, SingularMatrix) as error:
-        raise StudyError(f"{words}: {error}") from None
+        raise StudyError(f"{context}: {error}") from None
 
 
-def require_count(words: str, count: int) -> None:
+def require_count(context: str, count: int) -> None:
     """Raise StudyError where a number of modes is none."""
     if count_of(count) is None:
-        raise StudyError(f"{words}: a whole number of at least 1 is needed")
+        raise StudyError(f"{context}: a whole number of at least 1 is needed")

@@ -28,19 +28,19 @@ class Interpolation:
     """Values of unknowns in cells that hold places.
 
     layout: of the unknowns. located: pairs of a place and a cell. entries: unknown -> pairs,
-    unknowns and weights (e,) each. known: unknown -> whether a pair (m,) has a value of it.
+    unknowns and weights (e,) each. defined: unknown -> whether a pair (m,) has a value of it.
     """
 
     layout: DofLayout
     located: Located
     entries: Mapping[str, tuple[Integers, Integers, Array]]
-    known: Mapping[str, Flags]
+    defined: Mapping[str, Flags]
 
     def values(self, x: Array) -> dict[str, Array]:
         """Unknown -> values (m,) of x, (n,), nan where a cell has none."""
         pairs = len(self.located.point)
         return {
-            name: np.where(self.known[name], np.bincount(pair, weight * x[dof], pairs), np.nan)
+            name: np.where(self.defined[name], np.bincount(pair, weight * x[dof], pairs), np.nan)
             for name, (pair, dof, weight) in self.entries.items()
         }
 
@@ -56,19 +56,19 @@ class Interpolation:
         vectors = zip(self.layout.vectors, self.layout.fields, strict=True)
         sizes = {name: np.abs(x[part]).max(initial=0) for names, part in vectors for name in names}
         for name, (pair, dof, weight) in self.entries.items():
-            apart = np.abs(values[name] - values[name][first])
-            for k in np.flatnonzero(apart > _APART * sizes[name]):
+            distance = np.abs(values[name] - values[name][first])
+            for k in np.flatnonzero(distance > _APART * sizes[name]):
                 both = [set(dof[(pair == p) & (np.abs(weight) > _NOTHING)]) for p in (k, first[k])]
                 if both[0] != both[1]:
                     return name, np.array([first[k], k])
         return None
 
 
-def interpolation(system: System, places: Array, group: str | None = None) -> Interpolation:
+def interpolation(system: System, points: Array, group: str | None = None) -> Interpolation:
     """Unknowns at places (n, dim), in the cells, of a group, that hold them."""
-    located = system.mesh.holding(places, group)
+    located = system.mesh.holding(points, group)
     entries: dict[str, list[tuple[Integers, Integers, Array]]] = {}
-    known: dict[str, Any] = {
+    defined: dict[str, Any] = {
         name: np.zeros(len(located.point), np.bool_) for name in system.numbering.nodal
     }
     for kind, pairs in located.by_kind():
@@ -86,45 +86,52 @@ def interpolation(system: System, places: Array, group: str | None = None) -> In
                     corners[:, : linear.shape[1]] = weights @ linear
                     parts.append((lower, corners))
                     inside[lower] = True
-            for rows, own in parts:
+            for rows, shape in parts:
                 row, column = np.nonzero(dofs[rows] >= 0)
                 row = rows[row]
-                entry = pairs[row], dofs[row, column], own[row, column]
+                entry = pairs[row], dofs[row, column], shape[row, column]
                 entries.setdefault(name, []).append(entry)
-            known[name][pairs] = inside
+            defined[name][pairs] = inside
     joined = {
         n: tuple(map(np.concatenate, zip(*parts, strict=True))) for n, parts in entries.items()
     }
-    return Interpolation(system.numbering.layout, located, joined, known)  # type: ignore[arg-type]
+    return Interpolation(system.numbering.layout, located, joined, defined)  # type: ignore[arg-type]
 
 
-def _among(rows: Integers, known: Integers) -> Flags:
+def _among(rows: Integers, candidates: Integers) -> Flags:
     """Which rows (m, k) are among the known ones (n, k)."""
-    near = known[np.isin(known[:, 0], rows[:, 0])]
-    there = set(map(tuple, near.tolist()))
-    return np.array([tuple(row) in there for row in rows.tolist()], dtype=np.bool_)
+    similar = candidates[np.isin(candidates[:, 0], rows[:, 0])]
+    existing = set(map(tuple, similar.tolist()))
+    return np.array([tuple(row) in existing for row in rows.tolist()], dtype=np.bool_)
 
 
-def shares(system: System, place: Array) -> dict[str, tuple[Integers, Array]] | None:
+def interpolation_weights(system: System, point: Array) -> dict[str, tuple[Integers, Array]] | None:
     """Unknown -> numbers (k,) and weights (k,) that make its value at a place (dim,), in the first
     cell that holds it.
 
     Without unknowns that this cell does not have; None where no cell is there.
     """
-    found = interpolation(system, np.asarray(place)[None])
-    if not len(found.located.point):
+    interpolated = interpolation(system, np.asarray(point)[None])
+    if not len(interpolated.located.point):
         return None
-    chosen = {name: entry[0] == 0 for name, entry in found.entries.items() if found.known[name][0]}
-    return {n: (found.entries[n][1][rows], found.entries[n][2][rows]) for n, rows in chosen.items()}
+    in_first_cell = {
+        name: entry[0] == 0
+        for name, entry in interpolated.entries.items()
+        if interpolated.defined[name][0]
+    }
+    return {
+        n: (interpolated.entries[n][1][rows], interpolated.entries[n][2][rows])
+        for n, rows in in_first_cell.items()
+    }
 
 
-def between_nodes(
-    system: System, places: Array, nodal: Mapping[str, Array], group: str | None = None
+def interpolate_nodal(
+    system: System, points: Array, nodal: Mapping[str, Array], group: str | None = None
 ) -> list[dict[str, float] | None]:
     """Values at places (n, dim) of fields by their values at nodes, (points,), in the first cell
     of a group that has them; nan where none has, None where no cell is there.
     """
-    located = system.mesh.holding(places, group)
+    located = system.mesh.holding(points, group)
     values = {name: np.empty(len(located.point)) for name in nodal}
     for kind, pairs in located.by_kind():
         cell, nodes = CELLS[kind], system.mesh.cells[kind][located.row[pairs]]
@@ -132,10 +139,10 @@ def between_nodes(
         some = np.abs(weights) > _NOTHING  # at a side between blocks only nodes of the side matter
         for name, field in nodal.items():
             values[name][pairs] = np.where(some, field[nodes] * weights, 0.0).sum(axis=1)
-    rows: list[dict[str, float] | None] = [None] * len(places)
+    rows: list[dict[str, float] | None] = [None] * len(points)
     for pair, point in enumerate(located.point.tolist()):
-        known = rows[point]
-        if known is None or all(map(np.isnan, known.values())):
+        row = rows[point]
+        if row is None or all(map(np.isnan, row.values())):
             rows[point] = {name: float(field[pair]) for name, field in values.items()}
     return rows
 
@@ -144,25 +151,25 @@ def at_every_node(system: System, x: Array) -> dict[str, Array]:
     """Unknown -> values (points,) of x, (n,), also at the other nodes of cells at whose corners it
     stands; nan where there is none.
     """
-    found = {}
+    nodal_values = {}
     for name, numbers in system.numbering.nodal.items():
-        values = found[name] = np.where(numbers >= 0, x[numbers], np.nan)
+        values = nodal_values[name] = np.where(numbers >= 0, x[numbers], np.nan)
         for block in _at_corners(system, name):
             linear = _linear(block.kind)
             corners = linear.shape[1]
             values[block.nodes[:, corners:]] = values[block.nodes[:, :corners]] @ linear[corners:].T
-    return found
+    return nodal_values
 
 
 def _at_corners(system: System, name: str) -> list[Block]:
     """Blocks in which an unknown stands at the corners of the elements only."""
-    found = []
+    blocks = []
     for block in system.blocks.values():
         cell = CELLS.get(block.kind)
         nodes = {slot.node for slot in block.slots if slot.name == name}
         if cell and cell.order > 1 and nodes == set(range(cell.corners)):
-            found.append(block)
-    return found
+            blocks.append(block)
+    return blocks
 
 
 @cache

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.definition.argument_checks import datum, known
+from softehl.runtime.definition.argument_checks import datum, require_names
 from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.element_blocks import ElementBlock
@@ -17,7 +17,7 @@ from softehl.runtime.discretisation.mass import PARAMETER, MassKernel, interpola
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.suggestions import listed, meant
+from softehl.runtime.suggestions import did_you_mean, join_names
 
 Masses: TypeAlias = Mapping[str, Mapping[str, Any]]
 """Block -> {"rho": density, "of": unknowns that have it}."""
@@ -25,28 +25,28 @@ Masses: TypeAlias = Mapping[str, Mapping[str, Any]]
 _EXAMPLE = 'mass={"body": {"rho": 1e-9}}'
 
 
-def mass_blocks(system: System, given: Masses | None) -> list[ElementBlock]:
+def mass_blocks(system: System, densities: Masses | None) -> list[ElementBlock]:
     """Elements of mass: block -> {"rho": a number, (n,) numbers or a function of centres}.
 
     rho: mass per reference volume (in 2-D per area, times 1 or the ring). of: unknowns that have
     it; left out, u_x, u_y, u_z. A page on several kinds of cells is named once. Raises StudyError.
     """
-    found: list[ElementBlock] = []
-    if given is not None and not isinstance(given, Mapping):
-        raise StudyError(f"mass = {given!r}: give densities by blocks, as in {_EXAMPLE}")
-    for name, values in (given or {}).items():
+    element_blocks: list[ElementBlock] = []
+    if densities is not None and not isinstance(densities, Mapping):
+        raise StudyError(f"mass = {densities!r}: give densities by blocks, as in {_EXAMPLE}")
+    for name, values in (densities or {}).items():
         blocks = [b for b in system.blocks.values() if b.name == name or _base(b) == name]
         if not blocks:
             names = list(dict.fromkeys(_base(b) for b in system.blocks.values()))
             raise StudyError(
-                f"mass: no block {name!r}{meant(name, names)}; there are {listed(names)}"
+                f"mass: no block {name!r}{did_you_mean(name, names)}; there are {join_names(names)}"
             )
         if isinstance(values, Mapping):
-            known("key", values, ("rho", "of"), f"mass of {name!r}")
+            require_names("key", values, ("rho", "of"), f"mass of {name!r}")
         if not isinstance(values, Mapping) or "rho" not in values:
             raise StudyError(f"mass of {name!r}: give its density, as in {_EXAMPLE}")
-        found += [_elements(system, block, values) for block in blocks]
-    return found
+        element_blocks += [_elements(system, block, values) for block in blocks]
+    return element_blocks
 
 
 def _base(block: Block) -> str:
@@ -88,18 +88,22 @@ def _elements(system: System, block: Block, values: Mapping[str, Any]) -> Elemen
 
 
 def _names(
-    system: System, block: Block, at: list[str], asked: Sequence[str] | None
+    system: System, block: Block, at: list[str], requested: Sequence[str] | None
 ) -> tuple[str, ...]:
     """Unknowns at nodes that have the mass.  Raises StudyError."""
-    if isinstance(asked, str):
-        asked = (asked,)
-    if asked is not None:
-        known("unknown", asked, dict.fromkeys(at), f"mass of {block.name!r}")
-    names = tuple(n for n in ("u_x", "u_y", "u_z") if n in at) if asked is None else tuple(asked)
+    if isinstance(requested, str):
+        requested = (requested,)
+    if requested is not None:
+        require_names("unknown", requested, dict.fromkeys(at), f"mass of {block.name!r}")
+    names = (
+        tuple(n for n in ("u_x", "u_y", "u_z") if n in at)
+        if requested is None
+        else tuple(requested)
+    )
     if not names or len({at.count(n) for n in names}) > 1:
         raise StudyError(
             f"mass of {block.name!r}: say which unknowns have it, "
-            f'"of": ["w"]; at nodes there are {listed(dict.fromkeys(at))}'
+            f'"of": ["w"]; at nodes there are {join_names(dict.fromkeys(at))}'
         )
     return names
 
@@ -109,13 +113,13 @@ def has_acceleration(system: System) -> bool:
     return any(PARAMETER in b.kernel.parameters for b in system.blocks.values())
 
 
-def mass_matrix(system: System, problem: Problem, x: Array, given: Masses | None) -> csc_array:
+def mass_matrix(system: System, problem: Problem, x: Array, densities: Masses | None) -> csc_array:
     """M, (n, n), at unknowns x: of the densities, and of pages with accelerations; of a system that
     is spread over processes what the elements of this one add.
 
     Raises StudyError where there is none.
     """
-    blocks = mass_blocks(system, given)
+    blocks = mass_blocks(system, densities)
     M = csc_array((system.size, system.size))
     if blocks:
         assembler = Assembler.build(system.size, blocks)
@@ -132,12 +136,12 @@ def mass_matrix(system: System, problem: Problem, x: Array, given: Masses | None
     return M
 
 
-def _of_page(problem: Problem, block: ElementBlock, x: Array, place: int) -> csc_array:
+def _of_page(problem: Problem, block: ElementBlock, x: Array, column: int) -> csc_array:
     """Change of the residuals of a page by its accelerations."""
     alone = Assembler.build(problem.assembler.size, [block])
     parts = []
     for value in (1.0, 0.0):
         parameters = problem.parameters[block.name].copy()
-        parameters[place] = value
+        parameters[column] = value
         parts.append(alone.linearise(x, {block.name: parameters})[1])
     return csc_array(parts[0] - parts[1])

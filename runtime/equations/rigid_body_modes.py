@@ -30,7 +30,7 @@ _BALANCINGS = 20  # each halves the exponents that are left
 _AXES = "xyz"
 
 
-def require_held(system: System, problem: Any, x: Array) -> None:
+def require_supported(system: System, problem: Any, x: Array) -> None:
     """Raise NotConverged that names the free motion if nothing holds a part of the problem at x.
 
     One that is spread over processes is looked at after its first step (`solve.singularity_check`).
@@ -64,24 +64,26 @@ def require_held(system: System, problem: Any, x: Array) -> None:
         shape = len(free), len(system.numbering.nodal), system.mesh.dimension + 1
         unit = np.ones(shape[1])
         unit[name[members]] = units[members]
-        told = _Motions(system, free.reshape(shape), unit, centres[part], sizes[part]).words()
+        motions = _Motions(system, free.reshape(shape), unit, centres[part], sizes[part]).names()
         first = int(node[members[node[members] >= 0]].min())
         alone = (parts[node >= 0] == part).all()
-        raise NotConverged(_loose(system, x, told, first, alone=bool(alone)))
+        raise NotConverged(_unsupported(system, x, motions, first, alone=bool(alone)))
 
 
-def _loose(system: System, x: Array, told: str, node: int, *, alone: bool) -> Solution:
-    place = place_text(system.mesh.points[node])
-    words = f"nothing prevents {told}" + ("" if alone else f" of the part with node {node} {place}")
-    return Solution(x, Status.NOT_HELD, words, (), 0, 0)
+def _unsupported(system: System, x: Array, motions: str, node: int, *, alone: bool) -> Solution:
+    location = place_text(system.mesh.points[node])
+    message = f"nothing prevents {motions}" + (
+        "" if alone else f" of the part with node {node} {location}"
+    )
+    return Solution(x, Status.NOT_HELD, message, (), 0, 0)
 
 
 def _nodal(system: System) -> tuple[Integers, Integers]:
     """Node and number of the name of each unknown, (n,), -1 where it is at no node."""
     node, name = np.full(system.size, -1), np.full(system.size, -1)
     for k, numbers in enumerate(system.numbering.nodal.values()):
-        there = np.flatnonzero(numbers >= 0)
-        node[numbers[there]], name[numbers[there]] = there, k
+        nodes = np.flatnonzero(numbers >= 0)
+        node[numbers[nodes]], name[numbers[nodes]] = nodes, k
     return node, name
 
 
@@ -91,36 +93,40 @@ def _candidates(
     """Fields (n, names (1 + dim)): each name's 1, x, y, z, about the centre of each part and
     relative to its size; the centres (parts, dim) and sizes (parts,).
     """
-    own = np.flatnonzero(node >= 0)
-    places, label, count = system.mesh.points[node[own]], parts[own], int(parts.max()) + 1
+    nodal_dofs = np.flatnonzero(node >= 0)
+    points, label, count = (
+        system.mesh.points[node[nodal_dofs]],
+        parts[nodal_dofs],
+        int(parts.max()) + 1,
+    )
     weights = np.maximum(np.bincount(label, minlength=count), 1)[:, None]
-    sums = [np.bincount(label, column, count) for column in places.T]
+    sums = [np.bincount(label, column, count) for column in points.T]
     centres = np.stack(sums, axis=1) / weights
-    apart = places - centres[label]
+    relative = points - centres[label]
     sizes = np.zeros(count)
-    np.maximum.at(sizes, label, np.abs(apart).max(axis=1))
+    np.maximum.at(sizes, label, np.abs(relative).max(axis=1))
     sizes[sizes == 0.0] = 1.0
-    width = places.shape[1] + 1
+    width = points.shape[1] + 1
     fields = np.zeros((len(node), len(system.numbering.nodal), width))
-    fields[own, name[own], 0] = 1.0
-    fields[own, name[own], 1:] = apart / sizes[label, None]
+    fields[nodal_dofs, name[nodal_dofs], 0] = 1.0
+    fields[nodal_dofs, name[nodal_dofs], 1:] = relative / sizes[label, None]
     return fields.reshape(len(node), -1), centres, sizes
 
 
-def _units(known: list[str], K: csc_array, parts: Integers, name: Integers) -> Array:
+def _units(names: list[str], K: csc_array, parts: Integers, name: Integers) -> Array:
     """Units of the unknowns, (n,), in which the terms of an equation K x, (n, n), count alike: a
     pressure in Pa beside displacements in mm. One for each part and each vector or scalar.
     """
-    vectors = [stem if axis in _AXES else n for n in known for stem, _, axis in [n.rpartition("_")]]
+    vectors = [stem if axis in _AXES else n for n in names for stem, _, axis in [n.rpartition("_")]]
     kinds = {stem: k for k, stem in enumerate(dict.fromkeys(vectors))}
     if len(kinds) < 2:
         return np.ones(len(name))
     kind = np.array([*(kinds[stem] for stem in vectors), len(kinds)])[name]  # the last: no node
-    found, group = np.unique(parts * (len(kinds) + 1) + kind, return_inverse=True)
+    groups, group = np.unique(parts * (len(kinds) + 1) + kind, return_inverse=True)
     ones, n = np.ones(len(name)), np.arange(len(name))
-    member = csc_array((ones, (n, group)), shape=(len(name), len(found)))
+    member = csc_array((ones, (n, group)), shape=(len(name), len(groups)))
     terms = csc_array(member.T @ abs(K) @ member)
-    rows, columns = np.ones(len(found)), np.ones(len(found))
+    rows, columns = np.ones(len(groups)), np.ones(len(groups))
     for _ in range(_BALANCINGS):  # the method of Ruiz
         scaled = terms.multiply(rows[:, None]).multiply(columns)
         largest = [scaled.max(axis=k).toarray().ravel() for k in (1, 0)]
@@ -135,8 +141,10 @@ def _independent(fields: Array) -> Array:
     """
     triangle = np.linalg.qr(fields, mode="r") if len(fields) > fields.shape[1] else fields
     _, values, vectors = np.linalg.svd(triangle, full_matrices=False)
-    kept = values > 1e-9 * np.sqrt(len(fields))
-    return np.asarray((vectors[kept] * (np.sqrt(len(fields)) / values[kept])[:, None]).T)
+    independent = values > 1e-9 * np.sqrt(len(fields))
+    return np.asarray(
+        (vectors[independent] * (np.sqrt(len(fields)) / values[independent])[:, None]).T
+    )
 
 
 def _null(rows: Array) -> Array:
@@ -146,8 +154,10 @@ def _null(rows: Array) -> Array:
     triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
     _, values, vectors = np.linalg.svd(triangle)
     values = np.append(values, np.zeros(len(vectors) - len(values)))
-    found = vectors[values <= _ROUNDING * np.sqrt(len(rows))]
-    return np.asarray(found[np.abs(rows @ found.T).max(axis=0, initial=0.0) <= _ROUNDING])
+    null_vectors = vectors[values <= _ROUNDING * np.sqrt(len(rows))]
+    return np.asarray(
+        null_vectors[np.abs(rows @ null_vectors.T).max(axis=0, initial=0.0) <= _ROUNDING]
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,57 +172,61 @@ class _Motions:
     centre: Array
     size: float
 
-    def words(self) -> str:
+    def names(self) -> str:
         """Names of the motions: translations and shifts, then rotations, then anything else."""
         k, names, width = self.motions.shape
-        slopes = self.motions[:, :, 1:].reshape(k, -1)
-        left, values, _ = np.linalg.svd(slopes)
+        gradients = self.motions[:, :, 1:].reshape(k, -1)
+        left, values, _ = np.linalg.svd(gradients)
         bent = np.append(values, np.zeros(k))[:k] > 1e-6
         turned = (left.T @ self.motions.reshape(k, -1)).reshape(k, names, width)
-        still = turned[~bent][:, :, 0]
-        found = [self._shift(v) for v in _along_axes(still)]
+        translations = turned[~bent][:, :, 0]
+        descriptions = [self._shift(v) for v in _along_axes(translations)]
         vector = self._vector()
         if vector is None or not bent.any():
-            return ", ".join([*found, *("a motion linear in the places" for _ in turned[bent])])
-        return ", ".join([*found, *self._rotations(turned[bent][:, vector], moves=len(still) > 0)])
+            return ", ".join(
+                [*descriptions, *("a motion linear in the places" for _ in turned[bent])]
+            )
+        return ", ".join(
+            [*descriptions, *self._rotations(turned[bent][:, vector], moves=len(translations) > 0)]
+        )
 
     def _vector(self) -> list[int] | None:
         """Numbers of the names that are components of one vector, along all coordinates."""
-        known, axes = list(self.system.numbering.nodal), _AXES[: self.system.mesh.dimension]
-        for stem in {name.rpartition("_")[0] for name in known}:
-            wanted = [f"{stem}_{axis}" for axis in axes]
-            if stem and len(axes) > 1 and all(name in known for name in wanted):
-                return [known.index(name) for name in wanted]
+        unknowns, axes = list(self.system.numbering.nodal), _AXES[: self.system.mesh.dimension]
+        for stem in {name.rpartition("_")[0] for name in unknowns}:
+            components = [f"{stem}_{axis}" for axis in axes]
+            if stem and len(axes) > 1 and all(name in unknowns for name in components):
+                return [unknowns.index(name) for name in components]
         return None
 
     def _shift(self, values: Array) -> str:
-        known, vector = list(self.system.numbering.nodal), self._vector() or []
+        unknowns, vector = list(self.system.numbering.nodal), self._vector() or []
         moved = np.flatnonzero(np.abs(values) > 1e-6)
         if len(moved) == 1 and moved[0] in vector:
             return f"a translation along {_AXES[vector.index(int(moved[0]))]}"
         if len(moved) == 1:
-            return f"a constant added to {known[moved[0]]}"
+            return f"a constant added to {unknowns[moved[0]]}"
         amounts = values * self.units / self.units[moved].max()
-        parts = ", ".join(f"{known[i]} by {amounts[i]:.3g}" for i in moved)
+        parts = ", ".join(f"{unknowns[i]} by {amounts[i]:.3g}" for i in moved)
         return f"a shift of {parts}"
 
     def _rotations(self, turned: Array, *, moves: bool) -> list[str]:
         """Of motions (k, dim, 1 + dim) of the displacements."""
-        slopes = turned[:, :, 1:]
-        if np.abs(slopes + slopes.transpose(0, 2, 1)).max() > 1e-6 * np.abs(slopes).max():
+        gradients = turned[:, :, 1:]
+        if np.abs(gradients + gradients.transpose(0, 2, 1)).max() > 1e-6 * np.abs(gradients).max():
             return ["a motion linear in the places"]
-        if slopes.shape[1] == 2:
-            axes, words = np.zeros((len(slopes), 0)), ["a rotation"]
+        if gradients.shape[1] == 2:
+            axes, descriptions = np.zeros((len(gradients), 0)), ["a rotation"]
         else:
-            axes = np.stack([slopes[:, 2, 1], slopes[:, 0, 2], slopes[:, 1, 0]], axis=1)
-            words = [f"a rotation about {_direction(a)}" for a in _along_axes(axes)]
-        if moves or len(slopes) > 1:
-            return words
-        offset = np.linalg.lstsq(slopes[0], -turned[0, :, 0], rcond=1e-6)[0]
-        place = self.centre + self.size * offset
-        place[np.abs(place) < 1e-6 * self.size] = 0.0
+            axes = np.stack([gradients[:, 2, 1], gradients[:, 0, 2], gradients[:, 1, 0]], axis=1)
+            descriptions = [f"a rotation about {_direction(a)}" for a in _along_axes(axes)]
+        if moves or len(gradients) > 1:
+            return descriptions
+        offset = np.linalg.lstsq(gradients[0], -turned[0, :, 0], rcond=1e-6)[0]
+        centre = self.centre + self.size * offset
+        centre[np.abs(centre) < 1e-6 * self.size] = 0.0
         axis = f"{_direction(axes[0])} through " if axes.size else ""
-        return [f"a rotation about {axis}{place_text(place)}"]
+        return [f"a rotation about {axis}{place_text(centre)}"]
 
 
 def _direction(axis: Array) -> str:
@@ -226,16 +240,16 @@ def _direction(axis: Array) -> str:
 
 def _along_axes(vectors: Array) -> Array:
     """A basis (k, m) of the span of vectors (k, m), in reduced echelon form: few entries each."""
-    found, row = vectors.copy(), 0
-    for column in range(found.shape[1]):
-        if row == len(found):
+    basis, row = vectors.copy(), 0
+    for column in range(basis.shape[1]):
+        if row == len(basis):
             break
-        pivot = row + int(np.abs(found[row:, column]).argmax())
-        if abs(found[pivot, column]) < 1e-6:
+        pivot = row + int(np.abs(basis[row:, column]).argmax())
+        if abs(basis[pivot, column]) < 1e-6:
             continue
-        found[[row, pivot]] = found[[pivot, row]]
-        found[row] /= found[row, column]
-        others = np.arange(len(found)) != row
-        found[others] -= found[others, column][:, None] * found[row]
+        basis[[row, pivot]] = basis[[pivot, row]]
+        basis[row] /= basis[row, column]
+        others = np.arange(len(basis)) != row
+        basis[others] -= basis[others, column][:, None] * basis[row]
         row += 1
-    return found[:row]
+    return basis[:row]

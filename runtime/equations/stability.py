@@ -61,13 +61,13 @@ def negative_by_factors(problem: Any, K: Any, factors: Any) -> int | None:
         return None
     if not isinstance(K, csc_array) or not is_symmetric(K):
         return None
-    found = pivots()
-    if found is None:
+    values = pivots()
+    if values is None:
         return None
     natural = int(concave(problem, K).sum())
-    if len(found) == K.shape[0]:  # else internal unknowns are condensed
+    if len(values) == K.shape[0]:  # else internal unknowns are condensed
         natural += internal_negative(problem, K)
-    return max(int((found < 0.0).sum()) - natural, 0)
+    return max(int((values < 0.0).sum()) - natural, 0)
 
 
 def _hidden(problem: Problem) -> bool:
@@ -81,15 +81,15 @@ def _hidden(problem: Problem) -> bool:
     return any(bool(fixed[part].all()) for part in problem.layout.fields)
 
 
-def warn_unstable(problem: Any, x: Array, factors: tuple[Any, Any] | None, words: str) -> None:
+def warn_unstable(problem: Any, x: Array, factors: tuple[Any, Any] | None, context: str) -> None:
     """Warn where a state x, (n,), is unstable.
 
-    factors: a tangent near by and its factors, if they are at hand. words: of the state.
+    factors: a tangent near by and its factors, if they are at hand. context: of the state.
     """
     along = _falls_along(problem, x, factors)
     if along:
         warn(
-            f"the state at {words} is unstable: its energy falls along {along} "
+            f"the state at {context} is unstable: its energy falls along {along} "
             '(result.modes shows them); study.follow(detect="bifurcation") finds other branches',
             UnstableState,
             stacklevel=4,
@@ -98,15 +98,15 @@ def warn_unstable(problem: Any, x: Array, factors: tuple[Any, Any] | None, words
 
 def _falls_along(problem: Any, x: Array, factors: tuple[Any, Any] | None) -> str:
     """Along how many directions the energy falls, in words; empty where along none."""
-    found = None
+    count = None
     if factors is not None:
-        found = negative_by_factors(problem, *factors)
+        count = negative_by_factors(problem, *factors)
         iterative = getattr(factors[1], "indefinite", None)
-        falls = iterative() if found is None and iterative is not None else None
+        falls = iterative() if count is None and iterative is not None else None
         if falls is not None:  # other factors would be too large
             return "one direction at least" if falls else ""
-    if found is None and isinstance(problem, Problem):
-        found = negative_directions(problem, x)
-    if not found:
+    if count is None and isinstance(problem, Problem):
+        count = negative_directions(problem, x)
+    if not count:
         return ""
-    return f"{found} independent directions" if found > 1 else "one direction"
+    return f"{count} independent directions" if count > 1 else "one direction"

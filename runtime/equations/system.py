@@ -15,7 +15,7 @@ from softehl.runtime.definition.problem_definition import (
     Condition,
     Force,
     Number,
-    Statement,
+    ProblemDefinition,
     StudyError,
 )
 from softehl.runtime.discretisation.assembly import Assembler
@@ -24,7 +24,7 @@ from softehl.runtime.discretisation.dofmap import Numbering
 from softehl.runtime.discretisation.loads import Tie, amount
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.mesh.mesh import Mesh, place_text
-from softehl.runtime.suggestions import few
+from softehl.runtime.suggestions import short_list
 
 _SAME = 1e-12
 """Of the largest of them: prescribed values that differ by less are the same but for rounding."""
@@ -35,20 +35,20 @@ class Step:
     """State of a problem in time: its time or load factor, and the step before.
 
     factor: of all numbers in loads and supports. old: (n,) unknowns of the step
-    before. rate, rest: du/dt = rate u + rest, rest (n,). dt: length of the step. histories: block
-    -> (cells, points, k) point data. acceleration, remainder: likewise d2u/dt2 = acceleration u +
-    remainder; None is zero. weights: of the states before in rest, the latest first.
+    before. rate, rate_offset: du/dt = rate u + rate_offset, (n,). dt: length of the step.
+    histories: block -> (cells, points, k) point data. acceleration, acceleration_offset: likewise
+    d2u/dt2; None is zero. weights: of the previous states in rate_offset, the latest first.
     """
 
     t: float
     factor: float
     old: Array
     rate: float
-    rest: Array
+    rate_offset: Array
     dt: float
     histories: Mapping[str, Array]
     acceleration: float = 0.0
-    remainder: Array | None = None
+    acceleration_offset: Array | None = None
     weights: tuple[float, ...] = ()
 
 
@@ -93,14 +93,14 @@ class System:
     start: Mapping[str, Array] = field(default_factory=dict)
     comm: Communicator = SERIAL
     whole: System | None = None
-    statement: Statement | None = field(default=None, repr=False)
+    statement: ProblemDefinition | None = field(default=None, repr=False)
     written: int = 0
     contacts: tuple[StateDependentBlocks, ...] = ()
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        names = few(self.numbering.layout.names)
-        return f"<System: {self.size} unknowns ({names}); blocks: {few(self.blocks)}>"
+        names = short_list(self.numbering.layout.names)
+        return f"<System: {self.size} unknowns ({names}); blocks: {short_list(self.blocks)}>"
 
     @property
     def everywhere(self) -> System:
@@ -123,8 +123,8 @@ class System:
         x = np.zeros(self.size)
         for name, values in self.start.items():
             numbers = self.numbering.nodal[name]
-            said = (numbers >= 0) & ~np.isnan(values)
-            x[numbers[said]] = values[said]
+            specified = (numbers >= 0) & ~np.isnan(values)
+            x[numbers[specified]] = values[specified]
         return x
 
     def histories(self) -> dict[str, Array]:
@@ -137,7 +137,7 @@ class System:
         """
         return {b.name: b.initial for b in self.blocks.values() if b.initial is not None}
 
-    def still(self, t: float, old: Array, histories: Mapping[str, Array]) -> Step:
+    def quasi_static_step(self, t: float, old: Array, histories: Mapping[str, Array]) -> Step:
         """Return a quasi-static step.
 
         Parameters
@@ -175,10 +175,10 @@ class System:
         Problem
             The problem.
         """
-        return self.problem(self.still(0.0, self.at_rest(), self.histories()))
+        return self.problem(self.quasi_static_step(0.0, self.at_rest(), self.histories()))
 
     def committed(
-        self, problem: Problem, x: Array, before: Mapping[str, Array]
+        self, problem: Problem, x: Array, previous: Mapping[str, Array]
     ) -> dict[str, Array]:
         """Return the history after a converged step.
 
@@ -188,7 +188,7 @@ class System:
             Equations of the step.
         x : array (n,)
             Unknowns at its end.
-        before : mapping of str to array
+        previous : mapping of str to array
             History before it.
 
         Returns
@@ -196,12 +196,12 @@ class System:
         dict of str to array (cells, points, k)
             Block -> values.
         """
-        after = dict(before)
+        after = dict(previous)
         for block in self.blocks.values():
             names = block.kernel.history
             if names:
                 fields = problem.fields(block.name, x)
-                state = before[block.name].copy()
+                state = previous[block.name].copy()
                 for name in names:
                     state[:, :, block.kernel.point_data.index(name)] = fields[f"new_{name}"]
                 after[block.name] = state
@@ -225,10 +225,10 @@ class System:
         StudyError
             Prescribed values contradict each other, or the study has changed since.
         """
-        posed: Problem = self.comm.distribute(self.part(step))
-        return posed
+        distributed: Problem = self.comm.distribute(self.local_problem(step))
+        return distributed
 
-    def part(self, step: Step) -> Problem:
+    def local_problem(self, step: Step) -> Problem:
         """Return the problem of a step, with the elements of this process.
 
         Parameters
@@ -258,12 +258,12 @@ class System:
         for block in self.assembler.blocks:
             page = self.blocks.get(block.name)
             if page is None:
-                given: Mapping[str, Number] = {
+                parameter_values: Mapping[str, Number] = {
                     **{"t": step.t, "factor": step.factor},
                     "acceleration": step.acceleration,
                 }
             else:
-                given = {
+                parameter_values = {
                     **{"rate": step.rate, "dt": step.dt, "acceleration": step.acceleration},
                     **page.parameters,
                 }
@@ -271,7 +271,7 @@ class System:
                     state = {"data": self._data(page, step)}
                     history = step.histories.get(page.name)
                     assembler = assembler.with_data(page.name, **state, point_data=history)
-            numbers = [given[name] for name in block.kernel.parameters]
+            numbers = [parameter_values[name] for name in block.kernel.parameters]
             parameters[block.name] = np.array([v(step.t) if callable(v) else v for v in numbers])
         layout = self.numbering.layout
         posed_on: dict[str, Any] = {"fixed": fixed, "values": values}
@@ -289,52 +289,56 @@ class System:
                 continue
             slot, source = page.filled[name], step.old
             if name in page.rates:
-                source = step.rest
+                source = step.rate_offset
             elif name in page.accelerations:
-                source = np.zeros(self.size) if step.remainder is None else step.remainder
+                source = (
+                    np.zeros(self.size)
+                    if step.acceleration_offset is None
+                    else step.acceleration_offset
+                )
             columns.append(source[self.numbering.nodal[slot.name][page.nodes[:, slot.node or 0]]])
         return np.stack(columns, axis=1) if columns else None
 
     def _require_tied(self, tie: Force, step: Step, values: Mapping[int, float]) -> None:
         """Raise StudyError where values that are prescribed on both sides break a tie."""
         assert isinstance(tie.kernel, Tie)
-        places = self.mesh.points[tie.nodes[:, 0]]
-        offsets = amount(tie.kernel.offset, places, step.t, step.factor)
+        points = self.mesh.points[tie.nodes[:, 0]]
+        offsets = amount(tie.kernel.offset, points, step.t, step.factor)
         numbers = self.numbering.nodal[tie.names[0]][tie.nodes]
         sizes = [abs(values[int(number)]) for number in numbers.ravel()]
         size = max([*sizes, *np.abs(offsets)], default=0.0)
         for (a, b), offset, node in zip(numbers, offsets, tie.nodes[:, 0], strict=True):
-            apart = values[int(a)] - values[int(b)] - float(offset)
-            if abs(apart) > _SAME * size:
+            difference = values[int(a)] - values[int(b)] - float(offset)
+            if abs(difference) > _SAME * size:
                 raise StudyError(
                     f"{tie.label}: at node {node} {place_text(self.mesh.points[node])} both sides "
-                    f"are prescribed, and {apart:g} apart"
+                    f"are prescribed, and {difference:g} apart"
                 )
 
     def _prescribed(self, step: Step) -> tuple[Integers, Array]:
         """Unknowns and values, each once; one that is given two values is refused."""
-        known = np.full(self.size, np.nan)
+        prescribed = np.full(self.size, np.nan)
         by = np.full(self.size, -1)
         for k, condition in enumerate(self.conditions):
             numbers = self.numbering.nodal[condition.name][condition.nodes]
-            places = self.mesh.points[condition.nodes]
-            values = amount(condition.value, places, step.t, step.factor)
-            there = numbers >= 0
-            numbers, values, nodes = numbers[there], values[there], condition.nodes[there]
-            wrong = np.flatnonzero((by[numbers] >= 0) & (known[numbers] != values))
-            if len(wrong):  # functions that agree at a corner do so but for rounding
+            points = self.mesh.points[condition.nodes]
+            values = amount(condition.value, points, step.t, step.factor)
+            defined = numbers >= 0
+            numbers, values, nodes = numbers[defined], values[defined], condition.nodes[defined]
+            conflicts = np.flatnonzero((by[numbers] >= 0) & (prescribed[numbers] != values))
+            if len(conflicts):  # functions that agree at a corner do so but for rounding
                 all_of = self.numbering.nodal[condition.name]
-                size = np.nanmax(np.abs([*known[all_of[all_of >= 0]], *values]))
-                apart = np.abs(known[numbers[wrong]] - values[wrong])
-                wrong = wrong[apart > _SAME * size]
-            if len(wrong):
-                i = int(wrong[0])
-                before = self.conditions[int(by[numbers[i]])]
+                size = np.nanmax(np.abs([*prescribed[all_of[all_of >= 0]], *values]))
+                differences = np.abs(prescribed[numbers[conflicts]] - values[conflicts])
+                conflicts = conflicts[differences > _SAME * size]
+            if len(conflicts):
+                i = int(conflicts[0])
+                first = self.conditions[int(by[numbers[i]])]
                 raise StudyError(
                     f"{condition.name} at node {nodes[i]} "
                     f"{place_text(self.mesh.points[nodes[i]])} is prescribed twice: "
-                    f"{known[numbers[i]]:g} by {before.words}, {values[i]:g} by {condition.words}"
+                    f"{prescribed[numbers[i]]:g} by {first.call}, {values[i]:g} by {condition.call}"
                 )
-            known[numbers], by[numbers] = values, k
+            prescribed[numbers], by[numbers] = values, k
         fixed = np.flatnonzero(by >= 0)
-        return fixed, known[fixed]
+        return fixed, prescribed[fixed]

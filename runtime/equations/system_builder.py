@@ -1,4 +1,4 @@
-"""From what was written down to equations: numbering, blocks of elements, the system."""
+"""From what was written down to build_system: numbering, blocks of elements, the system."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ import numpy as np
 from softehl.log import warn
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.definition.element_blocks import facet_nodes
-from softehl.runtime.definition.problem_definition import Block, Force, Statement, StudyError
+from softehl.runtime.definition.problem_definition import (
+    Block,
+    Force,
+    ProblemDefinition,
+    StudyError,
+)
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.dofmap import Elements, Numbering
 from softehl.runtime.discretisation.element_blocks import ElementBlock
@@ -19,10 +24,12 @@ from softehl.runtime.equations.contact_setup import contact_of, with_contacts
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.face_matching import match_faces
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.suggestions import listed, meant
+from softehl.runtime.suggestions import did_you_mean, join_names
 
 
-def equations(statement: Statement, fields: Mapping[str, Sequence[str]] | None = None) -> System:
+def build_system(
+    statement: ProblemDefinition, fields: Mapping[str, Sequence[str]] | None = None
+) -> System:
     """Equations of a statement; fields: see `Numbering.of`.
 
     Raises StudyError for what does not fit together.
@@ -31,13 +38,13 @@ def equations(statement: Statement, fields: Mapping[str, Sequence[str]] | None =
         raise StudyError("there are no elements: add a page, study.add('body', 'solid.py')")
     mesh, pages = statement.mesh, statement.blocks.values()
     _warn_of_holes(statement)
-    elements = [Elements(b.name, b.nodes, b.slots, b.shared, b.form.places) for b in pages]
+    elements = [Elements(b.name, b.nodes, b.slots, b.shared, b.form.dof_tables) for b in pages]
     try:
         numbering = Numbering.of(len(mesh.points), elements, fields)
     except ValueError as error:
         raise StudyError(str(error)) from None
     for c in statement.conditions:
-        _require(c.name, c.nodes, numbering, c.words, somewhere=mesh.anywhere)
+        _require(c.name, c.nodes, numbering, c.call, somewhere=mesh.anywhere)
     forces, implied = _forces(statement, numbering)
     ties = {f.label: len(f.nodes) for f in forces if isinstance(f.kernel, Tie)}
     layout = replace(
@@ -63,17 +70,19 @@ def equations(statement: Statement, fields: Mapping[str, Sequence[str]] | None =
     return with_contacts(system, contacts)
 
 
-def _warn_of_holes(statement: Statement) -> None:
+def _warn_of_holes(statement: ProblemDefinition) -> None:
     """Warn of cells without elements, where other cells have some: a body with a hole."""
     mesh = statement.mesh
     bare: dict[str, Flags] = {}
     for kind, nodes in mesh.cells.items():
-        own = [block.nodes for block in statement.blocks.values() if block.kind == kind]
-        if any(part is nodes or np.array_equal(part, nodes) for part in own):
+        block_nodes = [block.nodes for block in statement.blocks.values() if block.kind == kind]
+        if any(part is nodes or np.array_equal(part, nodes) for part in block_nodes):
             continue
-        known = np.concatenate([nodes[:0], *own])
+        with_elements = np.concatenate([nodes[:0], *block_nodes])
         bare[kind] = (
-            match_faces(nodes, known, nodes.shape[1]) < 0 if len(known) else nodes[:, 0] >= 0
+            match_faces(nodes, with_elements, nodes.shape[1]) < 0
+            if len(with_elements)
+            else nodes[:, 0] >= 0
         )
     count, total = sum(map(np.sum, bare.values())), sum(map(len, mesh.cells.values()))
     if not 0 < count < total:  # pages on sides or nodes alone leave no hole
@@ -84,7 +93,7 @@ def _warn_of_holes(statement: Statement) -> None:
         if any(map(len, group.values()))
         and all(k in bare and bare[k][rows].all() for k, rows in group.items() if len(rows))
     ]
-    of = f", those of {listed(map(repr, groups))}" if groups else ""
+    of = f", those of {join_names(map(repr, groups))}" if groups else ""
     warn(
         f"{count} of {total} cells of the mesh have no elements{of}: they are no part of the body; "
         "study.add(...) is for all cells or for a group, cells=...",
@@ -93,7 +102,7 @@ def _warn_of_holes(statement: Statement) -> None:
 
 
 def _forces(
-    statement: Statement, numbering: Numbering
+    statement: ProblemDefinition, numbering: Numbering
 ) -> tuple[tuple[Force, ...], tuple[Force, ...]]:
     """Forces to be solved for, and ties both sides of which are prescribed."""
     forces, implied = [], []
@@ -113,31 +122,32 @@ def _require(
     name: str,
     nodes: Integers,
     numbering: Numbering,
-    words: str,
+    context: str,
     *,
     somewhere: Callable[[object], bool] | None = None,
 ) -> None:
     """Raise StudyError unless the nodes have an unknown of this name; somewhere: some of them."""
     if name not in numbering.nodal:
-        known = listed(numbering.nodal)
+        existing = join_names(numbering.nodal)
         raise StudyError(
-            f"{words}: no unknown {name!r}{meant(name, numbering.nodal)}; at nodes: {known}"
+            f"{context}: no unknown {name!r}{did_you_mean(name, numbering.nodal)}; at nodes: "
+            f"{existing}"
         )
-    there = numbering.nodal[name][nodes] >= 0
-    if not (there.all() if somewhere is None else somewhere(there.any())):
-        raise StudyError(f"{words}: no page has the unknown {name!r} there")
+    defined = numbering.nodal[name][nodes] >= 0
+    if not (defined.all() if somewhere is None else somewhere(defined.any())):
+        raise StudyError(f"{context}: no page has the unknown {name!r} there")
 
 
-def _at_start(statement: Statement, numbering: Numbering) -> dict[str, Array]:
+def _at_start(statement: ProblemDefinition, numbering: Numbering) -> dict[str, Array]:
     """Unknown -> its values at every node, (points,), nan where nothing was said."""
-    found: dict[str, Array] = {}
+    initial_values: dict[str, Array] = {}
     for start in statement.start:
         somewhere = statement.mesh.anywhere
-        words = f"start({start.name}=...)"
-        _require(start.name, start.nodes, numbering, words, somewhere=somewhere)
-        values = found.setdefault(start.name, np.full(len(statement.mesh.points), np.nan))
+        context = f"start({start.name}=...)"
+        _require(start.name, start.nodes, numbering, context, somewhere=somewhere)
+        values = initial_values.setdefault(start.name, np.full(len(statement.mesh.points), np.nan))
         values[start.nodes] = start.values
-    return found
+    return initial_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,11 +160,13 @@ class _Writer:
     def page(self, block: Block) -> ElementBlock:
         n = len(block.nodes)
         width = block.nodes.shape[1] * self.mesh.dimension if block.kernel.coordinates else 0
-        places = self.mesh.points[block.nodes].reshape(n, width) if width else np.empty((n, 0))
-        given = [block.data[d] for d in block.kernel.data if d in block.data]
-        data = np.stack(given, axis=1) if given else None  # what else there is comes with steps
+        coordinates = self.mesh.points[block.nodes].reshape(n, width) if width else np.empty((n, 0))
+        element_data = [block.data[d] for d in block.kernel.data if d in block.data]
+        data = (
+            np.stack(element_data, axis=1) if element_data else None
+        )  # what else there is comes with steps
         return ElementBlock(
-            *(block.name, block.kernel, places, self.numbering.dofs[block.name]),
+            *(block.name, block.kernel, coordinates, self.numbering.dofs[block.name]),
             data=data,
             rule=block.form.rule,
             constant=block.form.constant,
@@ -163,11 +175,11 @@ class _Writer:
 
     def force(self, force: Force) -> ElementBlock:
         dofs = self.numbering.at(force.names, force.nodes)
-        places = self.mesh.points[force.nodes].reshape(len(dofs), -1)
+        coordinates = self.mesh.points[force.nodes].reshape(len(dofs), -1)
         if isinstance(force.kernel, Tie):
-            places = self.mesh.points[force.nodes[:, 0]]
+            coordinates = self.mesh.points[force.nodes[:, 0]]
             dofs = np.column_stack([dofs, self.numbering.layout.dofs(force.label)])
         constant = isinstance(force.kernel, Spring | Tie)
         return ElementBlock(
-            force.label, force.kernel, places, np.ascontiguousarray(dofs), constant=constant
+            force.label, force.kernel, coordinates, np.ascontiguousarray(dofs), constant=constant
         )

@@ -14,7 +14,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.fit.objective import Trials
 from softehl.runtime.sensitivity.jacobian import jacobian
-from softehl.runtime.sensitivity.quantities import Function
+from softehl.runtime.sensitivity.quantities import UserQuantity
 
 SECOND = (
     "the adjoint of a study has no derivatives, so its solution has no second ones: take jax.grad "
@@ -88,37 +88,37 @@ class Operation:
     @cached_property
     def _traced(self) -> Callable[[Any], Any]:
         jax, jnp = _jax()
-        whole = jax.ShapeDtypeStruct(self._first.x.shape, jnp.float64)
-        given = jax.ShapeDtypeStruct(self.start.shape, jnp.float64)
+        unknowns = jax.ShapeDtypeStruct(self._first.x.shape, jnp.float64)
+        inputs = jax.ShapeDtypeStruct(self.start.shape, jnp.float64)
 
         def adjoint(values: Any, g: Any) -> Any:
-            return jax.pure_callback(self._adjoint, given, values, g, vmap_method="sequential")
+            return jax.pure_callback(self._adjoint, inputs, values, g, vmap_method="sequential")
 
         def refused(primals: Any, tangents: Any) -> Any:
             raise NotImplementedError(SECOND)
 
         def solve(values: Any) -> Any:
             values = jnp.asarray(values, dtype=jnp.float64)
-            if values.shape != given.shape:
-                raise TypeError(f"inputs have shape {values.shape}, must be {given.shape}")
-            return jax.pure_callback(self._solved, whole, values, vmap_method="sequential")
+            if values.shape != inputs.shape:
+                raise TypeError(f"inputs have shape {values.shape}, must be {inputs.shape}")
+            return jax.pure_callback(self._solved, unknowns, values, vmap_method="sequential")
 
         pull: Any = jax.custom_jvp(adjoint)
         pull.defjvp(refused)
         solved: Any = jax.custom_vjp(solve)
         solved.defvjp(lambda values: (solved(values), values), lambda p, g: (pull(p, g),))
-        found: Callable[[Any], Any] = solved
-        return found
+        traced: Callable[[Any], Any] = solved
+        return traced
 
     def _solved(self, values: Any) -> Array:
         return self.trials.solved(np.asarray(values))[-1].x
 
     def _adjoint(self, values: Any, g: Any) -> Array:
-        trail = self.trials.solved(np.asarray(values))[-1].trail
-        assert trail is not None
+        tape = self.trials.solved(np.asarray(values))[-1].trail
+        assert tape is not None
         weights = np.asarray(g)
-        along = Function(lambda x: (float(weights @ x), weights))
-        row: Array = jacobian([(trail, along)], self.trials.inputs)[0]
+        along = UserQuantity(lambda x: (float(weights @ x), weights))
+        row: Array = jacobian([(tape, along)], self.trials.inputs)[0]
         return row
 
 

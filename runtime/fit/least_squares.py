@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.definition.argument_checks import finite
-from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.fit.objective import Trials
 from softehl.runtime.kernels.kernel_call import ArgumentError
@@ -19,9 +19,9 @@ from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity.input_parsing import By
 from softehl.runtime.sensitivity.inputs import Input, Key, PageDatum, PageParameter
 from softehl.runtime.sensitivity.jacobian import Entry, by_key, jacobian
-from softehl.runtime.sensitivity.quantities import AtPlace, Quantity, Reaction
+from softehl.runtime.sensitivity.quantities import PointValue, Quantity, ReactionSum
 from softehl.runtime.solve.solution import NotConverged
-from softehl.runtime.suggestions import few, listed
+from softehl.runtime.suggestions import join_names, short_list
 
 Measured: TypeAlias = Mapping[Any, Mapping[str, Any]]
 """A place (x, y), or a side for its reactions -> unknown -> a number, one for each step, or
@@ -29,7 +29,7 @@ Measured: TypeAlias = Mapping[Any, Mapping[str, Any]]
 
 
 @dataclass(frozen=True, eq=False)
-class Data:
+class Measurements:
     """Measurements: quantities, their numbers (m,), and the time or load factor of each, (m,)."""
 
     quantities: list[Quantity]
@@ -37,48 +37,54 @@ class Data:
     times: Array
 
     @classmethod
-    def read(cls, measured: Measured, times: Array) -> Data:
+    def read(cls, measured: Measured, times: Array) -> Measurements:
         """As they were given; a list has a number for each of the times.  Raises StudyError."""
-        found: list[tuple[Quantity, float, float]] = []
+        entries: list[tuple[Quantity, float, float]] = []
         if not isinstance(measured, Mapping) or not measured:
             raise StudyError('measured: a mapping is needed, {(48, 60): {"u_y": 12.4}}')
-        for place, values in measured.items():
+        for location, values in measured.items():
             if not isinstance(values, Mapping) or not values:
-                raise StudyError(f'measured at {place!r}: give unknowns, {{"u_y": 12.4}}')
-            for name, given in values.items():
-                made = Reaction(name, place) if isinstance(place, str) else _at(name, place)
-                words = f"measured at {place!r}: {name}"
-                found += [(made, v, t) for t, v in _series(words, given, times)]
-        quantities, numbers, places = zip(*found, strict=True)
-        return cls([*quantities], np.array(numbers), np.array(places))
+                raise StudyError(f'measured at {location!r}: give unknowns, {{"u_y": 12.4}}')
+            for name, measured_values in values.items():
+                made = (
+                    ReactionSum(name, location)
+                    if isinstance(location, str)
+                    else _at(name, location)
+                )
+                context = f"measured at {location!r}: {name}"
+                entries += [(made, v, t) for t, v in _series(context, measured_values, times)]
+        quantities, numbers, times_of_all = zip(*entries, strict=True)
+        return cls([*quantities], np.array(numbers), np.array(times_of_all))
 
 
-def _series(words: str, given: Any, times: Array) -> list[tuple[float, float]]:
+def _series(context: str, values: Any, times: Array) -> list[tuple[float, float]]:
     """Times and numbers.  Raises StudyError."""
-    if isinstance(given, Mapping):
-        pairs = [(float(t), float(v)) for t, v in given.items()]
+    if isinstance(values, Mapping):
+        pairs = [(float(t), float(v)) for t, v in values.items()]
     else:
-        if isinstance(given, np.ma.MaskedArray):
-            raise StudyError(f"{words} is a masked array: give {{t: number}} of what was measured")
-        row = np.asarray(given, dtype=np.float64)
+        if isinstance(values, np.ma.MaskedArray):
+            raise StudyError(
+                f"{context} is a masked array: give {{t: number}} of what was measured"
+            )
+        row = np.asarray(values, dtype=np.float64)
         if row.ndim and row.shape != times.shape:
             raise StudyError(
-                f"{words} has {len(row)} numbers and the path {len(times)} steps: give one for "
+                f"{context} has {len(row)} numbers and the path {len(times)} steps: give one for "
                 "each, or {t: number}, or one number for the last"
             )
-        ends = times if row.ndim else times[-1:]
-        pairs = [*zip(ends.tolist(), np.atleast_1d(row).tolist(), strict=True)]
+        end_times = times if row.ndim else times[-1:]
+        pairs = [*zip(end_times.tolist(), np.atleast_1d(row).tolist(), strict=True)]
     if not pairs or not np.isfinite(pairs).all():
-        raise StudyError(f"{words} must be finite numbers")
+        raise StudyError(f"{context} must be finite numbers")
     return pairs
 
 
-def _at(name: str, place: Any) -> AtPlace:
+def _at(name: str, point: Any) -> PointValue:
     try:
-        return AtPlace(name, tuple(float(c) for c in place))
+        return PointValue(name, tuple(float(c) for c in point))
     except (TypeError, ValueError):
         raise StudyError(
-            f"measured at {place!r}: a place is a tuple of numbers, a side is a name"
+            f"measured at {point!r}: a place is a tuple of numbers, a side is a name"
         ) from None
 
 
@@ -86,7 +92,7 @@ Bounds: TypeAlias = Mapping[Key, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
-class Scale:
+class SearchVariables:
     """Variables of the search, (k,): logarithms of what must stay positive, else multiples.
 
     sizes: (k,) of the inputs. positive: which of them are searched by logarithms: parameters and
@@ -100,7 +106,7 @@ class Scale:
     upper: Array
 
     @classmethod
-    def of(cls, inputs: Sequence[Input], bounds: Bounds) -> Scale:
+    def of(cls, inputs: Sequence[Input], bounds: Bounds) -> SearchVariables:
         """Raises StudyError for bounds of other inputs, or without the start between them."""
         start = np.concatenate([item.value for item in inputs])
         lower, upper = _limits(inputs, bounds)
@@ -112,18 +118,18 @@ class Scale:
         positive = np.concatenate(stiff) & (start > 0.0) & ((lower >= 0.0) | (lower == -np.inf))
         sizes = np.where(start == 0.0, 1.0, np.abs(start))
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = [
+            variables = [
                 np.where(positive, np.log(np.maximum(v, 0.0) / sizes), v / sizes)
                 for v in (start, lower, upper)
             ]
-        return cls(sizes, positive, *found)
+        return cls(sizes, positive, *variables)
 
     def values(self, y: Array) -> Array:
         """Inputs (k,) of variables (k,)."""
         with np.errstate(over="ignore"):
             return np.asarray(self.sizes * np.where(self.positive, np.exp(y), y))
 
-    def slopes(self, y: Array) -> Array:
+    def derivatives(self, y: Array) -> Array:
         """Derivatives (k,) of the inputs by the variables."""
         return np.asarray(np.where(self.positive, self.values(y), self.sizes))
 
@@ -132,7 +138,7 @@ def _limits(inputs: Sequence[Input], bounds: Bounds) -> tuple[Array, Array]:
     keys = [item.key for item in inputs]
     for key in bounds:
         if key not in keys:
-            raise StudyError(f"bounds: no input {key!r}; there are {listed(map(str, keys))}")
+            raise StudyError(f"bounds: no input {key!r}; there are {join_names(map(str, keys))}")
     pairs = [bounds.get(item.key, (-np.inf, np.inf)) for item in inputs]
     sizes = [len(item.value) for item in inputs]
     lower, upper = (
@@ -182,7 +188,10 @@ class Fit:
             for key, value in self.values.items()
         ]
         worst = float(np.abs(self.residuals).max(initial=0.0))
-        return f"<Fit: {few(values)}; residuals up to {worst:.3g}; {self.evaluations} evaluations>"
+        return (
+            f"<Fit: {short_list(values)}; residuals up to {worst:.3g}; "
+            f"{self.evaluations} evaluations>"
+        )
 
     @property
     def deviations(self) -> Array:
@@ -195,50 +204,50 @@ class LeastSquares:
     """Least squares of measurements: trials, data, their standard deviations (m,)."""
 
     trials: Trials
-    data: Data
+    data: Measurements
     sigma: Array | None
 
-    def fit(self, bounds: Bounds | None, most: int) -> Fit:
+    def fit(self, bounds: Bounds | None, max_evaluations: int) -> Fit:
         """The best inputs.  Raises StudyError, NotConverged for the start."""
-        scale = Scale.of(self.trials.inputs, bounds or {})
+        scale = SearchVariables.of(self.trials.inputs, bounds or {})
         self.residuals(self.trials.start)  # an error here is that of the study as it is given
 
         def residuals(y: Array) -> Array:
             return self._tried(scale.values(y))
 
-        def slopes(y: Array) -> Array:
-            return self.jacobian(scale.values(y)) * scale.slopes(y)
+        def derivatives(y: Array) -> Array:
+            return self.jacobian(scale.values(y)) * scale.derivatives(y)
 
-        found: Any = least_squares(
+        search: Any = least_squares(
             residuals,
             scale.start,
-            slopes,
+            derivatives,
             bounds=(scale.lower, scale.upper),
             ftol=1e-14,
             xtol=1e-9,  # the step after it would be its square
             gtol=None,
-            max_nfev=most,
+            max_nfev=max_evaluations,
         )
-        if found.status == 0:
+        if search.status == 0:
             raise StudyError(
-                f"fit: {most} trials were not enough: give most=..., or a better start"
+                f"fit: {max_evaluations} trials were not enough: give most=..., or a better start"
             )
-        values = scale.values(found.x)
+        values = scale.values(search.x)
         last = self.trials.solved(values)[-1]
-        covariance, words = self._covariance(found.jac, found.fun, scale.slopes(found.x))
+        covariance, remark = self._covariance(search.jac, search.fun, scale.derivatives(search.x))
         return Fit(
             by_key(values, self.trials.inputs),
             covariance,
-            found.fun * self._scales(),
+            search.fun * self._scales(),
             self.trials.count,
             last,
-            f"{found.message}{words}",
+            f"{search.message}{remark}",
         )
 
     def residuals(self, values: Array) -> Array:
         """Results less measurements, (m,), over their deviations or sizes."""
-        found = [q.value(trail) for trail, q in self._entries(values)]
-        return (np.array(found) - self.data.numbers) / self._scales()
+        values_of_all = [q.value(tape) for tape, q in self._entries(values)]
+        return (np.array(values_of_all) - self.data.numbers) / self._scales()
 
     def jacobian(self, values: Array) -> Array:
         """Their derivatives, (m, k)."""
@@ -259,28 +268,30 @@ class LeastSquares:
     def _entries(self, values: Array) -> list[Entry]:
         """Quantities with the steps that end when they were measured.  Raises StudyError."""
         results = self.trials.solved(values)
-        ends = np.array([result.t for result in results])
-        found: list[Entry] = []
+        end_times = np.array([result.t for result in results])
+        entries: list[Entry] = []
         for q, t in zip(self.data.quantities, self.data.times, strict=True):
-            near = int(np.abs(ends - t).argmin())
-            trail = results[near].trail
-            if trail is None or abs(ends[near] - t) > _SPAN * max(abs(t), abs(ends[-1])):
+            nearest = int(np.abs(end_times - t).argmin())
+            tape = results[nearest].trail
+            if tape is None or abs(end_times[nearest] - t) > _SPAN * max(
+                abs(t), abs(end_times[-1])
+            ):
                 raise StudyError(
                     f"fit: the path has no step that ends at {t:g}, where was measured"
                 )
-            found.append((trail, q))
-        return found
+            entries.append((tape, q))
+        return entries
 
-    def _covariance(self, J: Array, residuals: Array, slopes: Array) -> tuple[Array, str]:
+    def _covariance(self, J: Array, residuals: Array, derivatives: Array) -> tuple[Array, str]:
         """Inverse of J^T J, times the variance of the residuals if no deviations were given.
 
-        slopes: of the inputs by what J is taken by.
+        derivatives: of the inputs by what J is taken by.
         """
         m, k = J.shape
         _, sizes, rows = np.linalg.svd(J, full_matrices=False)
         if m < k or sizes[-1] <= _RANK * sizes[0]:
             return np.full((k, k), np.inf), " What was measured does not determine all inputs."
-        half = (rows.T / sizes) * slopes[:, None]
+        half = (rows.T / sizes) * derivatives[:, None]
         scale = 1.0
         if self.sigma is None:
             scale = float(residuals @ residuals) / (m - k) if m > k else np.inf
@@ -288,7 +299,7 @@ class LeastSquares:
 
 
 def fit(
-    definition: Statement,
+    definition: ProblemDefinition,
     measured: Measured,
     *,
     by: By,
@@ -304,7 +315,7 @@ def fit(
     if "dt" in arguments:
         dt = arguments["dt"]
         times = dt * np.arange(1, round(until / dt) + 1)
-    data = Data.read(measured, times)
+    data = Measurements.read(measured, times)
     deviations = None if sigma is None else np.broadcast_to(sigma, data.numbers.shape).copy()
     trials = Trials.by(definition, by, arguments)
     return LeastSquares(trials, data, deviations).fit(bounds, most)

@@ -13,15 +13,15 @@ from softehl.runtime.analyses.load_stepping import solve
 from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.analyses.time_stepping import march
 from softehl.runtime.arrays import Array
-from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.equations.stability import UnstableState
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity import input_parsing
 from softehl.runtime.sensitivity.input_parsing import By
-from softehl.runtime.sensitivity.inputs import Input, Key, varied
+from softehl.runtime.sensitivity.inputs import Input, Key, varied_definition_of
 from softehl.runtime.sensitivity.jacobian import jacobian
 from softehl.runtime.sensitivity.quantities import Quantity, quantity
-from softehl.runtime.suggestions import few
+from softehl.runtime.suggestions import short_list
 
 
 @dataclass(eq=False)
@@ -31,7 +31,7 @@ class Trials:
     arguments: of `solve`, or of `march` if there is a dt. count: how often the study was solved.
     """
 
-    definition: Statement
+    definition: ProblemDefinition
     inputs: Sequence[Input]
     arguments: Mapping[str, Any]
     count: int = 0
@@ -39,7 +39,7 @@ class Trials:
     _cached_values: Array | None = None
 
     @classmethod
-    def by(cls, definition: Statement, by: By, arguments: Mapping[str, Any]) -> Trials:
+    def by(cls, definition: ProblemDefinition, by: By, arguments: Mapping[str, Any]) -> Trials:
         """Return the trials of a definition by inputs.  Raises StudyError."""
         return cls(definition, input_parsing.inputs(definition, by), arguments)
 
@@ -60,7 +60,7 @@ class Trials:
 
     def _solve(self, changes: Sequence[tuple[Input, Array]]) -> list[Result]:
         """Results of all steps with other values of inputs."""
-        definition, results = varied(self.definition, changes), list[Result]()
+        definition, results = varied_definition_of(self.definition, changes), list[Result]()
         keywords = {"progress": False, "record": True, **self.arguments}
         options, arguments = SolverOptions.split(keywords)
         with warnings.catch_warnings():
@@ -90,7 +90,7 @@ class Objective:
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        return f"<Objective: {type(self.quantity).__name__} by {few(map(str, self._keys))}>"
+        return f"<Objective: {type(self.quantity).__name__} by {short_list(map(str, self._keys))}>"
 
     @property
     def _keys(self) -> list[Key]:
@@ -121,14 +121,14 @@ class Objective:
         NotConverged
             The study has no solution for these values.
         """
-        trail = self.trials.solved(np.asarray(values, dtype=np.float64))[-1].trail
-        assert trail is not None
-        row = jacobian([(trail, self.quantity)], self.trials.inputs)[0]
-        return self.quantity.value(trail), row
+        tape = self.trials.solved(np.asarray(values, dtype=np.float64))[-1].trail
+        assert tape is not None
+        row = jacobian([(tape, self.quantity)], self.trials.inputs)[0]
+        return self.quantity.value(tape), row
 
 
 def objective(
-    definition: Statement,
+    definition: ProblemDefinition,
     what: str | Callable[[Array], tuple[float, Array]],
     *,
     by: By,
@@ -140,24 +140,26 @@ def objective(
     return Objective(Trials.by(definition, by, arguments), quantity(what, at, reaction))
 
 
-def varied_definition(definition: Statement, values: Mapping[Key, float | Array]) -> Statement:
+def varied_definition(
+    definition: ProblemDefinition, values: Mapping[Key, float | Array]
+) -> ProblemDefinition:
     """Return a copy of a definition with other values of inputs; see `Study.varied`."""
-    inputs = input_parsing.of_keys(definition, list(values))
+    inputs = input_parsing.inputs_of_keys(definition, list(values))
     changes = [(i, _numbers(i, v)) for i, v in zip(inputs, values.values(), strict=True)]
-    return varied(definition, changes)
+    return varied_definition_of(definition, changes)
 
 
 def _numbers(item: Input, value: object) -> Array:
     """Numbers of an input, one for all or one for each.  Raises StudyError."""
-    words, n = f"varied({item.key!r}: ...)", item.value.size
-    given = np.asarray(value)
-    if given.dtype.kind not in "fiu":
+    context, n = f"varied({item.key!r}: ...)", item.value.size
+    array = np.asarray(value)
+    if array.dtype.kind not in "fiu":
         raise StudyError(
-            f"{words}: a number is needed, which replaces a number of the study and multiplies a "
+            f"{context}: a number is needed, which replaces a number of the study and multiplies a "
             f"function; given {type(value).__name__}; for another function write the study anew"
         )
-    found = given.astype(np.float64)
-    if found.size not in (1, n) or not np.isfinite(found).all():
+    numbers = array.astype(np.float64)
+    if numbers.size not in (1, n) or not np.isfinite(numbers).all():
         many = f", or {n} of them" if n > 1 else ""
-        raise StudyError(f"{words}: one finite number{many} is needed; given {value!r}")
-    return np.broadcast_to(found.ravel(), n).copy()
+        raise StudyError(f"{context}: one finite number{many} is needed; given {value!r}")
+    return np.broadcast_to(numbers.ravel(), n).copy()

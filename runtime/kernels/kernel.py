@@ -26,7 +26,7 @@ from softehl.runtime.kernels.shared_library import (
     library_of,
     manifest,
 )
-from softehl.runtime.suggestions import few
+from softehl.runtime.suggestions import short_list
 
 __all__ = [
     "ArgumentError",
@@ -52,8 +52,8 @@ class Kernel(Family):
     def __repr__(self) -> str:
         """Summary in one line."""
         return (
-            f"<Kernel {self.name}: {self.nodes} nodes; unknowns: {few(self.unknowns)}; parameters: "
-            f"{few(self.parameters)}; data: {few(self.data)}>"
+            f"<Kernel {self.name}: {self.nodes} nodes; unknowns: {short_list(self.unknowns)}; "
+            f"parameters: {short_list(self.parameters)}; data: {short_list(self.data)}>"
         )
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -24,7 +24,7 @@ from softehl.runtime.arrays import Array, Flags, Integers, frozen
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.face_matching import match_faces, orient_as, unrepeated_faces
 from softehl.runtime.mesh.partitioning import MeshPartition
-from softehl.runtime.suggestions import few, listed, meant, misfit
+from softehl.runtime.suggestions import did_you_mean, join_names, misfit, short_list
 
 if TYPE_CHECKING:
     from softehl.runtime.mesh.point_location import Located, PointLocator
@@ -92,7 +92,7 @@ class Mesh:
         faces = [faces for side in self.sides.values() for faces in side.items()]
         for name, nodes in (*self.cells.items(), *faces):
             if name not in CELLS:
-                raise MeshError(f"no cells {name!r}{meant(name, CELLS)}")
+                raise MeshError(f"no cells {name!r}{did_you_mean(name, CELLS)}")
             count = len(CELLS[name].nodes)
             if nodes.ndim != 2 or nodes.shape[1] != count:
                 raise MeshError(f"{name} has nodes of shape {nodes.shape}, must be (m, {count})")
@@ -127,10 +127,10 @@ class Mesh:
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        kinds = listed(f"{len(nodes)} {kind}" for kind, nodes in self.cells.items())
+        kinds = join_names(f"{len(nodes)} {kind}" for kind, nodes in self.cells.items())
         return (
             f"<Mesh: {len(self.points)} points in {self.dimension}-D, {kinds}; groups: "
-            f"{few(self.groups)}; sides: {few(self.sides)}>"
+            f"{short_list(self.groups)}; sides: {short_list(self.sides)}>"
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -530,7 +530,9 @@ class Mesh:
             return self.boundary
         if where not in self.sides:
             allowed = ", ".join([*self.sides, "boundary"])
-            raise MeshError(f"no side {where!r}{meant(where, self.sides)}; there are {allowed}")
+            raise MeshError(
+                f"no side {where!r}{did_you_mean(where, self.sides)}; there are {allowed}"
+            )
         return {
             kind: orient_as(faces, self.boundary[kind], CELLS[kind].corners)
             if kind in self.boundary
@@ -566,7 +568,7 @@ class Mesh:
                 face_word = {1: "nodes", 2: "lines"}.get(self.dimension, "faces")
                 raise MeshError(
                     f"{name} is of {what} ({kind}); in {self.dimension}-D a side of {face_word} of "
-                    f"the boundary is needed, such as {few(self._outer_sides())}"
+                    f"the boundary is needed, such as {short_list(self._outer_sides())}"
                 )
             lost = faces[match_faces(faces, outer, cell.corners) < 0] if solid else faces[:0]
             if len(lost):
@@ -636,7 +638,9 @@ class Mesh:
             return self.cells
         if group not in self.groups:
             allowed = ", ".join(self.groups) or "none"
-            raise MeshError(f"no group {group!r}{meant(group, self.groups)}; there are {allowed}")
+            raise MeshError(
+                f"no group {group!r}{did_you_mean(group, self.groups)}; there are {allowed}"
+            )
         return {
             kind: self.cells[kind][numbers]
             for kind, numbers in self.groups[group].items()
@@ -707,7 +711,7 @@ class Mesh:
         if len(nodes) > 1:
             raise MeshError(
                 f"{len(nodes)} nodes are at {place_text(place)}: name one by its number, "
-                f"{listed(map(str, nodes))}, or a side of one body"
+                f"{join_names(map(str, nodes))}, or a side of one body"
             )
 
     def locate(self, place: Array) -> tuple[Integers, Array]:

@@ -17,7 +17,7 @@ from softehl.runtime.solve.linear.amg import AlgebraicMultigrid, AmgOrDirect, Ne
 from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.linear.linear_solver import LinearSolver
 from softehl.runtime.solve.linear.static_condensation import CondensingSolver
-from softehl.runtime.suggestions import listed
+from softehl.runtime.suggestions import join_names
 
 Linear: TypeAlias = Literal["auto", "direct", "superlu", "pardiso", "amg", "matrix-free"]
 
@@ -53,7 +53,7 @@ def internal_unknowns(assembler: Assembler) -> tuple[Integers, ...]:
 def _of_rest(system: System, linear: Linear, count: int) -> tuple[LinearSolver, Callable[[], str]]:
     """A linear solver of so many unknowns, all but the internal ones."""
     if linear not in get_args(Linear):
-        raise StudyError(f"linear = {linear!r}: allowed are {listed(get_args(Linear))}")
+        raise StudyError(f"linear = {linear!r}: allowed are {join_names(get_args(Linear))}")
     if linear in ("superlu", "pardiso"):
         return direct_solver(linear), str
     direct = direct_solver("auto")

@@ -235,7 +235,7 @@ def _page(block: Block, rows: Integers) -> Block:
     return replace(
         block,
         nodes=block.nodes[rows],
-        form=replace(block.form, along={n: p[rows] for n, p in block.form.places.items()}),
+        form=replace(block.form, along={n: p[rows] for n, p in block.form.dof_tables.items()}),
         data={name: values[rows] for name, values in block.data.items()},
         initial=_rows_or_none(block.initial, rows),
     )

@@ -41,16 +41,16 @@ class Picture:
     ) -> Picture:
         """With the means of the fields, (cells, points), of blocks that stand on these cells."""
         rows = {kind: {tuple(r): k for k, r in enumerate(n.tolist())} for kind, n in cells.items()}
-        found: dict[str, dict[str, Array]] = {}
+        cellwise: dict[str, dict[str, Array]] = {}
         for name, block in blocks.items():
             if block.kind not in cells or not block.kernel.fields:
                 continue
-            chosen = [rows[block.kind][tuple(row)] for row in block.nodes.tolist()]
+            cell_numbers = [rows[block.kind][tuple(row)] for row in block.nodes.tolist()]
             for label, values in fields(name).items():
                 data = {kind: np.full(len(nodes), np.nan) for kind, nodes in cells.items()}
-                data[block.kind][chosen] = values.mean(axis=1)
-                found[f"{name}.{label}"] = data
-        return cls(points, cells, nodal, found)
+                data[block.kind][cell_numbers] = values.mean(axis=1)
+                cellwise[f"{name}.{label}"] = data
+        return cls(points, cells, nodal, cellwise)
 
     def compact(self) -> Picture:
         """Without the points that no cell has."""
@@ -65,7 +65,7 @@ class Picture:
         """Write .vtu, atomically."""
         meshio = import_meshio()
         small = {kind: _small(kind, nodes) for kind, nodes in self.cells.items()}
-        found = meshio.Mesh(
+        vtu_mesh = meshio.Mesh(
             np.pad(self.points, ((0, 0), (0, 3 - self.points.shape[1]))),
             list(small.values()),
             point_data={**self.nodal, **_vectors(self.nodal)},
@@ -78,7 +78,7 @@ class Picture:
             },
         )
         with replacing(path) as temporary:
-            meshio.write(temporary, found, file_format="vtu")
+            meshio.write(temporary, vtu_mesh, file_format="vtu")
 
     def write_index(self, path: Path, pieces: list[str]) -> None:
         """Write the .pvtu of these pieces, of which this is one."""

@@ -16,7 +16,7 @@ from softehl.runtime.definition.element_blocks import facet_nodes
 from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.kernels.kernel_call import Rule
 from softehl.runtime.mesh.cells import CELLS, Cell
-from softehl.runtime.suggestions import listed
+from softehl.runtime.suggestions import join_names
 
 RECOVERIES = ("projection", "mean")
 """How a field comes from the points of a cell to its nodes."""
@@ -30,7 +30,9 @@ def nodal_operator(block: Block, recovery: str) -> tuple[Integers, Array]:
     Raises StudyError.
     """
     if recovery not in RECOVERIES:
-        raise StudyError(f"recovery = {recovery!r}: allowed are {listed(map(repr, RECOVERIES))}")
+        raise StudyError(
+            f"recovery = {recovery!r}: allowed are {join_names(map(repr, RECOVERIES))}"
+        )
     rule = block.form.rule or block.kernel.default_rule
     cell, facet = CELLS[block.kind], facet_nodes(block.kernel)
     nodes = block.nodes if facet is None else block.nodes[:, facet]
@@ -41,8 +43,8 @@ def nodal_operator(block: Block, recovery: str) -> tuple[Integers, Array]:
         operator = projection(cell, rule, max(_order(block, cell) - 1, 1))
     if block.kernel.cell.endswith("_interior"):  # the facet as the second cell sees it
         assert facet is not None
-        there = block.nodes[:, block.nodes.shape[1] // 2 :][:, facet]
-        return np.hstack([nodes, there]), np.vstack([operator, operator[_mirrored(cell)]])
+        second_cell = block.nodes[:, block.nodes.shape[1] // 2 :][:, facet]
+        return np.hstack([nodes, second_cell]), np.vstack([operator, operator[_mirrored(cell)]])
     return nodes, operator
 
 
@@ -95,6 +97,6 @@ def _mirrored(face: Cell) -> Integers:
         if (c.dimension, c.corners, c.order) == (face.dimension, face.corners, 1)
     )
     turned = face.nodes[[(1 - k) % face.corners for k in range(face.corners)]]
-    places = flat.shape(face.nodes) @ turned
-    apart = np.linalg.norm(face.nodes[None] - places[:, None], axis=2)
-    return np.asarray(apart.argmin(axis=1))
+    mirrored_points = flat.shape(face.nodes) @ turned
+    distances = np.linalg.norm(face.nodes[None] - mirrored_points[:, None], axis=2)
+    return np.asarray(distances.argmin(axis=1))

@@ -20,7 +20,7 @@ from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.eigenproblems import natural_modes
 from softehl.runtime.equations.interpolation import (
     at_every_node,
-    between_nodes,
+    interpolate_nodal,
     interpolation,
 )
 from softehl.runtime.equations.mass_matrix import Masses
@@ -33,9 +33,9 @@ from softehl.runtime.sensitivity.input_parsing import By, inputs
 from softehl.runtime.sensitivity.inputs import Input, Key
 from softehl.runtime.sensitivity.jacobian import derivative, sensitivity
 from softehl.runtime.sensitivity.quantities import quantity
-from softehl.runtime.sensitivity.tape import Trail
+from softehl.runtime.sensitivity.tape import Tape
 from softehl.runtime.solve.solution import Point, Solution, Status
-from softehl.runtime.suggestions import few, listed, meant
+from softehl.runtime.suggestions import did_you_mean, join_names, short_list
 
 if TYPE_CHECKING:
     from softehl.runtime.equations.system import System
@@ -69,7 +69,7 @@ class Result:
     problem: Problem
     point: Point
     histories: Mapping[str, Array] = field(default_factory=dict)
-    trail: Trail | None = field(default=None, repr=False)
+    trail: Tape | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """Histories that cannot be written to."""
@@ -78,10 +78,11 @@ class Result:
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        whole = self._whole
+        global_system = self._global_system
         return (
-            f"<{type(self).__name__} at t = {self.t:.6g}: {whole.size} unknowns "
-            f"({few(whole.numbering.layout.names)}); blocks: {few(whole.blocks)}>"
+            f"<{type(self).__name__} at t = {self.t:.6g}: {global_system.size} unknowns "
+            f"({short_list(global_system.numbering.layout.names)}); "
+            f"blocks: {short_list(global_system.blocks)}>"
         )
 
     def __copy__(self) -> Self:
@@ -145,18 +146,22 @@ class Result:
         UnknownNameError
             There is no such unknown; a KeyError.
         """
-        numbers = self._whole.numbering.nodal.get(name)
+        numbers = self._global_system.numbering.nodal.get(name)
         if numbers is None:
-            layout = self._whole.numbering.layout
+            layout = self._global_system.numbering.layout
             if name not in layout.names:
-                known = f"{meant(name, layout.names)}; there are {listed(layout.names)}"
-                raise UnknownNameError(f"no unknown {name!r}{self._field_called(name) or known}")
+                suggestions = (
+                    f"{did_you_mean(name, layout.names)}; there are {join_names(layout.names)}"
+                )
+                raise UnknownNameError(
+                    f"no unknown {name!r}{self._field_called(name) or suggestions}"
+                )
             return self.x[layout.part(name)]
         return np.where(numbers >= 0, self.x[numbers], np.nan)
 
     def _field_called(self, name: str) -> str:
         """A hint at the block whose field a name is, for messages."""
-        for label, block in self._whole.blocks.items():
+        for label, block in self._global_system.blocks.items():
             if name in (*block.kernel.fields, *block.kernel.internal):
                 return (
                     f", but a field: fields({label!r})[{name!r}] has it at the points, "
@@ -182,9 +187,9 @@ class Result:
         UnknownNameError
             There is no such unknown at nodes; a KeyError.
         """
-        if name not in self._whole.numbering.nodal:
-            known = ", ".join(self._whole.numbering.nodal)
-            raise UnknownNameError(f"no unknown {name!r} at nodes; there are {known}")
+        if name not in self._global_system.numbering.nodal:
+            existing = ", ".join(self._global_system.numbering.nodal)
+            raise UnknownNameError(f"no unknown {name!r} at nodes; there are {existing}")
         return self.system.comm.gather_nodes(self.values(name))
 
     def at(
@@ -212,7 +217,7 @@ class Result:
         MeshError
             The place lies outside the mesh or group.
         """
-        (row,) = self._at_places(np.asarray(place, dtype=np.float64)[None], cells, block)
+        (row,) = self._at_points(np.asarray(place, dtype=np.float64)[None], cells, block)
         return row
 
     def along(
@@ -250,50 +255,55 @@ class Result:
             A place lies outside the mesh or group.
         """
         a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-        shares = np.linspace(0.0, 1.0, count)
-        rows = self._at_places(a + shares[:, None] * (b - a), cells, block)
+        fractions = np.linspace(0.0, 1.0, count)
+        rows = self._at_points(a + fractions[:, None] * (b - a), cells, block)
         names = [name for name in rows[0] if all(name in row for row in rows)]
         columns = {name: np.array([row[name] for row in rows]) for name in names}
-        return {"s": shares * float(np.linalg.norm(b - a)), **columns}
+        return {"s": fractions * float(np.linalg.norm(b - a)), **columns}
 
-    def _at_places(
-        self, places: Array, group: str | None, block: str | None
+    def _at_points(
+        self, points: Array, group: str | None, block: str | None
     ) -> list[dict[str, float]]:
         """Unknowns, or fields of a block, at each place (n, dim).  Raises MeshError for one
         outside.
         """
         if block is None:
-            here = self._unknowns_at(places, group)
+            local_rows = self._unknowns_at(points, group)
         else:
-            here = between_nodes(self._whole, places, self.at_nodes(block), group)
-        rows = self.system.comm.first_not_none(here)
-        for place, row in zip(places, rows, strict=True):
+            local_rows = interpolate_nodal(self._global_system, points, self.at_nodes(block), group)
+        rows = self.system.comm.first_not_none(local_rows)
+        for point, row in zip(points, rows, strict=True):
             if row is None:
                 where = "the mesh" if group is None else f"the cells {group!r}"
-                raise MeshError(f"{place_text(place)} lies outside {where}")
+                raise MeshError(f"{place_text(point)} lies outside {where}")
         return [row for row in rows if row is not None]
 
-    def _unknowns_at(self, places: Array, group: str | None) -> list[dict[str, float] | None]:
+    def _unknowns_at(self, points: Array, group: str | None) -> list[dict[str, float] | None]:
         """Unknowns at each place (n, dim), None outside; a warning where bodies differ."""
-        mesh, found = self._whole.mesh, interpolation(self._whole, places, group)
-        located, values = found.located, found.values(self.x)
-        jump = found.jump(self.x)
+        mesh, interpolated = (
+            self._global_system.mesh,
+            interpolation(self._global_system, points, group),
+        )
+        located, values = interpolated.located, interpolated.values(self.x)
+        jump = interpolated.jump(self.x)
         if jump is not None:
             name, pairs = jump
             a, b = values[name][pairs]
-            point = place_text(places[located.point[pairs[0]]])
+            point = place_text(points[located.point[pairs[0]]])
             warn(
                 f"{name} at {point} is {a:.6g} in one cell and {b:.6g} in another, which do not "
                 f'share their nodes; the first is taken: name a group, cells="..." '
-                f"({listed(mesh.groups)})",
+                f"({join_names(mesh.groups)})",
                 stacklevel=4,
             )
-        here: list[dict[str, float] | None] = [None] * len(places)
+        rows: list[dict[str, float] | None] = [None] * len(points)
         for pair in located.first.tolist():
-            here[located.point[pair]] = {
-                n: float(values[n][pair]) for n, known in found.known.items() if known[pair]
+            rows[located.point[pair]] = {
+                n: float(values[n][pair])
+                for n, defined in interpolated.defined.items()
+                if defined[pair]
             }
-        return here
+        return rows
 
     def fields(self, block: str) -> dict[str, Array]:
         """Return the fields of a block at its quadrature points.
@@ -315,21 +325,23 @@ class Result:
         """
         self._block(block)
         comm = self.system.comm
-        return {n: comm.gather_cells(block, v) for n, v in self._own_fields(block).items()}
+        return {n: comm.gather_cells(block, v) for n, v in self._local_fields(block).items()}
 
     def _block(self, name: str) -> Block:
         """The block of a name, of all processes.  Raises KeyError that names what there is."""
-        blocks = self._whole.blocks
+        blocks = self._global_system.blocks
         if name not in blocks:
-            known = listed(blocks)
-            raise UnknownNameError(f"no block {name!r}{meant(name, blocks)}; there are {known}")
+            existing = join_names(blocks)
+            raise UnknownNameError(
+                f"no block {name!r}{did_you_mean(name, blocks)}; there are {existing}"
+            )
         return blocks[name]
 
-    def _own_fields(self, block: str) -> dict[str, Array]:
+    def _local_fields(self, block: str) -> dict[str, Array]:
         """Fields at the points of this process's elements."""
-        found = self.problem.fields(block, self.point.solution.x)
+        fields = self.problem.fields(block, self.point.solution.x)
         new = [f"new_{name}" for name in self.system.blocks[block].kernel.history]
-        return {name: values for name, values in found.items() if name not in new}
+        return {name: values for name, values in fields.items() if name not in new}
 
     def at_nodes(self, block: str, *, recovery: str = "projection") -> dict[str, Array]:
         """Return the fields of a block at the nodes.
@@ -360,13 +372,13 @@ class Result:
         points, piece = len(self.system.mesh.points), self.system.mesh.piece
 
         def sums(weights: Array) -> Array:
-            here = np.bincount(nodes.ravel(), weights.ravel(), points).astype(np.float64)
-            return self.system.comm.sum(here) if piece is None else piece.added(here)
+            local_sums = np.bincount(nodes.ravel(), weights.ravel(), points).astype(np.float64)
+            return self.system.comm.sum(local_sums) if piece is None else piece.added(local_sums)
 
         count = sums(np.ones(nodes.shape))
         return {
             name: np.where(count > 0, sums(values @ operator.T) / np.maximum(count, 1), np.nan)
-            for name, values in self._own_fields(block).items()
+            for name, values in self._local_fields(block).items()
         }
 
     @cached_property
@@ -378,11 +390,11 @@ class Result:
         x, assembler = self.point.solution.x, self.problem.assembler
         holding = [b.name for b in assembler.blocks if isinstance(b.kernel, Spring | Tie)]
         others = {n: v for n, v in self.problem.parameters.items() if n not in holding}
-        own = assembler.residual(x, others)
-        return self.system.comm.gather_forces(own)
+        local_forces = assembler.residual(x, others)
+        return self.system.comm.gather_forces(local_forces)
 
     @property
-    def _whole(self) -> System:
+    def _global_system(self) -> System:
         return self.system.everywhere
 
     def reaction(self, where: str | Predicate) -> dict[str, float]:
@@ -404,11 +416,11 @@ class Result:
             There is no such side.
         """
         nodes = self.system.mesh.nodes(where)
-        found = {}
-        for name, numbers in self._whole.numbering.nodal.items():
-            there = numbers[nodes]
-            found[name] = self.system.comm.sum_at(self._forces, there[there >= 0])
-        return found
+        sums = {}
+        for name, numbers in self._global_system.numbering.nodal.items():
+            dofs = numbers[nodes]
+            sums[name] = self.system.comm.sum_at(self._forces, dofs[dofs >= 0])
+        return sums
 
     @cached_property
     def unstable(self) -> int | None:
@@ -442,8 +454,8 @@ class Result:
             There is no mass, or the tangent is unsymmetric.
         """
         x = self.point.solution.x
-        squares, found = natural_modes(self.system, self.problem, x, count, mass)
-        return Modes(read_only(squares), tuple(ModeShape.of(self, mode) for mode in found))
+        squares, shapes = natural_modes(self.system, self.problem, x, count, mass)
+        return Modes(read_only(squares), tuple(ModeShape.of(self, mode) for mode in shapes))
 
     def sensitivity(
         self,
@@ -486,8 +498,8 @@ class Result:
         -----
         The adjoint method, through all steps of a path with history. Load and time steps are held.
         """
-        trail, given = self._differentiated(by)
-        return sensitivity(trail, quantity(what, at, reaction), given)
+        tape, selected = self._differentiated(by)
+        return sensitivity(tape, quantity(what, at, reaction), selected)
 
     def derivative(self, *, by: By) -> Array:
         """Return the derivatives of all unknowns with respect to inputs.
@@ -509,7 +521,7 @@ class Result:
         """
         return derivative(*self._differentiated(by))
 
-    def _differentiated(self, by: By) -> tuple[Trail, list[Input]]:
+    def _differentiated(self, by: By) -> tuple[Tape, list[Input]]:
         statement = self.system.everywhere.statement
         if self.trail is None or statement is None:
             raise StudyError(
@@ -554,21 +566,21 @@ class Result:
         Fields are named BLOCK.FIELD, at nodes as by `at_nodes` and in cells as means. Unknowns u_x,
         u_y, u_z are also written as a vector u. The file is complete at any moment.
         """
-        words, target, share = f"write({str(path)!r})", Path(path), self.system.comm
+        context, target, share = f"write({str(path)!r})", Path(path), self.system.comm
         if target.suffix not in (".vtu", ".pvtu"):
-            raise StudyError(f"{words}: results are written as .vtu or .pvtu")
+            raise StudyError(f"{context}: results are written as .vtu or .pvtu")
         if target.suffix == ".vtu" and self.system.mesh.piece is not None:
-            raise StudyError(f"{words}: of a mesh in parts results are .pvtu")
-        writable(words, target)
+            raise StudyError(f"{context}: of a mesh in parts results are .pvtu")
+        writable(context, target)
         if target.suffix == ".pvtu":
             pieces = piece_names(target, share.rank_and_size[1])
-            piece = self._picture(self.system, self._own_cells(), self.point.solution.x).compact()
+            piece = self._picture(self.system, self._local_cells(), self.point.solution.x).compact()
             piece.write(target.with_name(pieces[share.rank_and_size[0]]))
             share.barrier()
             if share.is_root:
                 piece.write_index(target, pieces)
         else:
-            picture = self._picture(self._whole, self.system.mesh.cells, self.x)
+            picture = self._picture(self._global_system, self.system.mesh.cells, self.x)
             if share.is_root:
                 picture.write(target)
         share.barrier()
@@ -576,25 +588,29 @@ class Result:
     def _picture(self, system: System, cells: Mapping[str, Integers], x: Array) -> Picture:
         """Of all unknowns x, or of those of this process with its own fields."""
         nodal = at_every_node(system, x)
-        for name, block in self._whole.blocks.items():
+        for name, block in self._global_system.blocks.items():
             if block.kernel.fields and CELLS[block.kind].dimension:
                 nodal |= {f"{name}.{label}": v for label, v in self.at_nodes(name).items()}
-        fields = self.fields if system is self._whole else self._own_fields
+        fields = self.fields if system is self._global_system else self._local_fields
         return Picture.of(system.mesh.points, cells, nodal, system.blocks, fields)
 
-    def _own_cells(self) -> dict[str, Integers]:
+    def _local_cells(self) -> dict[str, Integers]:
         """Cells of the elements of this process; on process 0 also those that have no elements."""
-        mesh, whole = self.system.mesh, self._whole.blocks.values()
+        mesh, blocks = self.system.mesh, self._global_system.blocks.values()
         if mesh.piece is not None:
             return dict(mesh.cells)
-        found = {}
+        local_cells = {}
         for kind, cells in mesh.cells.items():
-            own = [b.nodes for b in self.system.blocks.values() if b.kind == kind]
+            block_nodes = [b.nodes for b in self.system.blocks.values() if b.kind == kind]
             if self.system.comm.is_root:
-                there = {tuple(row) for b in whole if b.kind == kind for row in b.nodes.tolist()}
-                own.append(cells[[tuple(row) not in there for row in cells.tolist()]])
-            found[kind] = np.unique(np.concatenate([cells[:0], *own]), axis=0)
-        return found
+                with_elements = {
+                    tuple(row) for b in blocks if b.kind == kind for row in b.nodes.tolist()
+                }
+                block_nodes.append(
+                    cells[[tuple(row) not in with_elements for row in cells.tolist()]]
+                )
+            local_cells[kind] = np.unique(np.concatenate([cells[:0], *block_nodes]), axis=0)
+        return local_cells
 
 
 class ModeShape(Result):
@@ -610,7 +626,7 @@ class ModeShape(Result):
         """None."""
         return {}
 
-    def _own_fields(self, block: str) -> dict[str, Array]:
+    def _local_fields(self, block: str) -> dict[str, Array]:
         return {}
 
 
@@ -631,7 +647,7 @@ class Modes:
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        return f"<Modes: frequencies {few(f'{f:.6g}' for f in self.frequencies)}>"
+        return f"<Modes: frequencies {short_list(f'{f:.6g}' for f in self.frequencies)}>"
 
     @property
     def frequencies(self) -> Array:

@@ -16,7 +16,7 @@ from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.kernels.kernel import Kernel
-from softehl.runtime.sensitivity.tape import Trail
+from softehl.runtime.sensitivity.tape import Tape
 
 _WIDE = 1e-3
 """Of the size of an element: step of a difference of order 6, whose own error is then 1e-18."""
@@ -30,21 +30,21 @@ class Elements:
     coordinates and amount of a load.
     """
 
-    def __init__(self, trail: Trail, name: str) -> None:
-        self.block: ElementBlock = trail.problem.assembler.block(name)
-        self.parameters: Array = trail.problem.parameters[name]
-        self.dofs = np.ascontiguousarray(trail.x[self.block.dofs])
-        self.page = trail.system.blocks.get(name)
+    def __init__(self, tape: Tape, name: str) -> None:
+        self.block: ElementBlock = tape.problem.assembler.block(name)
+        self.parameters: Array = tape.problem.parameters[name]
+        self.dofs = np.ascontiguousarray(tape.x[self.block.dofs])
+        self.page = tape.system.blocks.get(name)
         self.coordinates = np.shape(self.block.coordinates)[1]
         self.n = len(self.dofs)
-        self._dimension = trail.system.mesh.dimension
+        self._dimension = tape.system.mesh.dimension
         if self.page is None:
             self.width = self.coordinates + 1
         else:
-            known = self.page.kernel
-            self.width = self.coordinates + len(known.data) + len(known.parameters)
+            kernel = self.page.kernel
+            self.width = self.coordinates + len(kernel.data) + len(kernel.parameters)
 
-    def still(self) -> Array:
+    def zero_rows(self) -> Array:
         """Rows (n, width) of arguments that do not move."""
         return np.zeros((self.n, self.width))
 
@@ -56,8 +56,8 @@ class Elements:
         if self.page is None:
             return self._load(rows)
         kernel = self._kernel("pseudo_load")
-        given = self._given(history)
-        return kernel.pseudo_load(self.block.coordinates, self.dofs, rows, **given)
+        arguments = self._arguments(history)
+        return kernel.pseudo_load(self.block.coordinates, self.dofs, rows, **arguments)
 
     def history(self, rows: Array, dofs: Array | None, history: Array | None = None) -> Array:
         """Rate of the point data after the step, (n, points, k), along a variation of all.
@@ -67,8 +67,8 @@ class Elements:
         assert self.page is not None
         kernel, moved = self._kernel("fields_rate"), np.zeros_like(self.dofs)
         along = np.hstack([rows, moved if dofs is None else dofs])
-        given = self._given(history)
-        rates = kernel.fields_rate(self.block.coordinates, self.dofs, along, **given)
+        arguments = self._arguments(history)
+        rates = kernel.fields_rate(self.block.coordinates, self.dofs, along, **arguments)
         page = self.page.kernel
         after = np.zeros((*rates.shape[:2], len(page.point_data)))
         for name in page.history:
@@ -76,13 +76,13 @@ class Elements:
             after[:, :, page.point_data.index(name)] = rates[:, :, column]
         return after
 
-    def _given(self, history: Array | None) -> dict[str, Any]:
+    def _arguments(self, history: Array | None) -> dict[str, Any]:
         block = self.block
-        given = block.given(self.parameters)
+        arguments = block.given(self.parameters)
         if block.point_data is None:
-            return given
+            return arguments
         moved = np.zeros_like(block.point_data) if history is None else history
-        return {**given, "point_data": np.concatenate([block.point_data, moved], axis=2)}
+        return {**arguments, "point_data": np.concatenate([block.point_data, moved], axis=2)}
 
     def _kernel(self, task: str) -> Kernel:
         """The kernel of derivatives.  Raises StudyError where there is none."""
@@ -107,26 +107,26 @@ class Elements:
             one = replace(kernel, **{name: value if callable(value) else 1.0})  # type: ignore[type-var]
             none = replace(kernel, **{name: 0.0})  # type: ignore[type-var]
             rate += amounts[:, None] * (self._at(one, 0.0) - self._at(none, 0.0))
-        places = rows[:, :width]
-        if places.any():
-            step = _WIDE * self._size() / float(np.abs(places).max())
+        coordinates = rows[:, :width]
+        if coordinates.any():
+            step = _WIDE * self._size() / float(np.abs(coordinates).max())
             for k, weight in _WEIGHTS:
-                ahead = self._at(kernel, k * step * places)
-                rate += weight / (60.0 * step) * (ahead - self._at(kernel, -k * step * places))
+                ahead = self._at(kernel, k * step * coordinates)
+                rate += weight / (60.0 * step) * (ahead - self._at(kernel, -k * step * coordinates))
         return rate
 
     def _at(self, kernel: Any, moved: Array | float) -> Array:
-        found = kernel.residual(
+        residual = kernel.residual(
             self.block.coordinates + moved, self.dofs, parameters=self.parameters
         )
-        return np.asarray(found)
+        return np.asarray(residual)
 
     def _size(self) -> float:
         """Of the smallest element, or of all of them where they are points."""
-        whole = np.abs(self.block.coordinates).max(initial=0.0)
+        largest = np.abs(self.block.coordinates).max(initial=0.0)
         nodes = self.block.coordinates.reshape(self.n, -1, self._dimension)
         extents = np.ptp(nodes, axis=1).max(axis=1)
-        return float(extents.min(where=extents > 0.0, initial=whole or 1.0))
+        return float(extents.min(where=extents > 0.0, initial=largest or 1.0))
 
 
 def _amount(kernel: object) -> str:

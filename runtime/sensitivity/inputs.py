@@ -17,16 +17,16 @@ from softehl.runtime.definition.problem_definition import (
     Block,
     Condition,
     Force,
-    Statement,
+    ProblemDefinition,
     StudyError,
 )
 from softehl.runtime.discretisation.loads import NodalForce, Spring, Tie, amount
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.sensitivity.tape import Trail
+from softehl.runtime.sensitivity.tape import Tape
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
+class InputColumn:
     """An argument of the elements of a block that moves with an input.
 
     column: among coordinates, data and parameters; of a load, coordinates and its amount. target:
@@ -40,17 +40,17 @@ class Column:
 
     def push(self, rows: Array, seed: Array) -> None:
         """Add the rate of the argument to rows (n, width) when the input moves by seed."""
-        there = self.target >= 0
-        rows[there, self.column] += self.factor[there] * seed[self.target[there]]
+        mask = self.target >= 0
+        rows[mask, self.column] += self.factor[mask] * seed[self.target[mask]]
 
     def pull(self, gradient: Array, slopes: Array) -> None:
         """Add to the gradient what the slopes (n,) by the argument make of it."""
-        there = self.target >= 0
-        np.add.at(gradient, self.target[there], self.factor[there] * slopes[there])
+        mask = self.target >= 0
+        np.add.at(gradient, self.target[mask], self.factor[mask] * slopes[mask])
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class PrescribedSeeds:
     """Prescribed values that move with an input.
 
     numbers: (m,) unknowns. target, factor: (m,), as of `Column`.
@@ -62,11 +62,11 @@ class Held:
 
 
 @dataclass(frozen=True, eq=False)
-class Moves:
+class InputSeeds:
     """All that moves with an input in one step."""
 
-    columns: Sequence[Column] = field(default=())
-    held: Sequence[Held] = field(default=())
+    columns: Sequence[InputColumn] = field(default=())
+    prescribed: Sequence[PrescribedSeeds] = field(default=())
 
 
 Key: TypeAlias = tuple[str, str]
@@ -93,11 +93,11 @@ class Input(Protocol):
         """True if it is one number."""
         ...
 
-    def moves(self, trail: Trail) -> Moves:
+    def seeds(self, tape: Tape) -> InputSeeds:
         """Arguments of elements and prescribed values that move with it in a step."""
         ...
 
-    def put(self, statement: Statement, value: Array) -> None:
+    def put(self, statement: ProblemDefinition, value: Array) -> None:
         """Change a statement."""
         ...
 
@@ -115,22 +115,22 @@ class PageParameter:
         """See `Input`."""
         return np.array([_number(self.blocks[0].parameters[self.key[1]])])
 
-    def moves(self, trail: Trail) -> Moves:
+    def seeds(self, tape: Tape) -> InputSeeds:
         """See `Input`."""
         columns, name = [], self.key[1]
         for block in self.blocks:
-            n, kernel, given = len(block.nodes), block.kernel, block.parameters[self.key[1]]
-            rate = given(trail.step.t) if callable(given) else 1.0
+            n, kernel, value = len(block.nodes), block.kernel, block.parameters[self.key[1]]
+            rate = value(tape.step.t) if callable(value) else 1.0
             width = kernel.nodes * len(kernel.coordinates) + len(kernel.data)
-            place = width + kernel.parameters.index(name)
-            columns.append(Column(block.name, place, _one(n), np.full(n, float(rate))))
-        return Moves(columns)
+            column = width + kernel.parameters.index(name)
+            columns.append(InputColumn(block.name, column, _one(n), np.full(n, float(rate))))
+        return InputSeeds(columns)
 
-    def put(self, statement: Statement, value: Array) -> None:
+    def put(self, statement: ProblemDefinition, value: Array) -> None:
         """See `Input`."""
         for block in self.blocks:
-            given = _changed(block.parameters[self.key[1]], float(value[0]))
-            parameters = {**statement.blocks[block.name].parameters, self.key[1]: given}
+            changed_value = _changed(block.parameters[self.key[1]], float(value[0]))
+            parameters = {**statement.blocks[block.name].parameters, self.key[1]: changed_value}
             changed = replace(statement.blocks[block.name], parameters=parameters)
             statement.blocks[block.name] = changed
 
@@ -148,28 +148,28 @@ class PageDatum:
         """See `Input`."""
         return np.concatenate([block.data[self.key[1]] for block in self.blocks])
 
-    def moves(self, trail: Trail) -> Moves:
+    def seeds(self, tape: Tape) -> InputSeeds:
         """See `Input`."""
         columns, start = [], 0
         for block in self.blocks:
             n, kernel = len(block.nodes), block.kernel
-            place = kernel.nodes * len(kernel.coordinates) + kernel.data.index(self.key[1])
-            columns.append(Column(block.name, place, start + np.arange(n), np.ones(n)))
+            column = kernel.nodes * len(kernel.coordinates) + kernel.data.index(self.key[1])
+            columns.append(InputColumn(block.name, column, start + np.arange(n), np.ones(n)))
             start += n
-        return Moves(columns)
+        return InputSeeds(columns)
 
-    def put(self, statement: Statement, value: Array) -> None:
+    def put(self, statement: ProblemDefinition, value: Array) -> None:
         """See `Input`."""
         start = 0
         for block in self.blocks:
-            n, known = len(block.nodes), statement.blocks[block.name]
-            data = {**known.data, self.key[1]: np.asarray(value[start : start + n]).copy()}
-            statement.blocks[block.name] = replace(known, data=data)
+            n, block_now = len(block.nodes), statement.blocks[block.name]
+            data = {**block_now.data, self.key[1]: np.asarray(value[start : start + n]).copy()}
+            statement.blocks[block.name] = replace(block_now, data=data)
             start += n
 
 
 @dataclass(frozen=True, eq=False)
-class Amounts:
+class LoadAmount:
     """The amount of a load, a pressure, a spring or the offset of a tie."""
 
     key: Key
@@ -183,28 +183,28 @@ class Amounts:
         kernel = self.forces[0].kernel
         return np.array([_number(getattr(kernel, _amount(self.forces[0])))])
 
-    def moves(self, trail: Trail) -> Moves:
+    def seeds(self, tape: Tape) -> InputSeeds:
         """See `Input`."""
-        there = {b.name: b for b in trail.problem.assembler.blocks}
-        blocks = [there[f.label] for f in self.forces if f.label in there]
+        element_blocks = {b.name: b for b in tape.problem.assembler.blocks}
+        blocks = [element_blocks[f.label] for f in self.forces if f.label in element_blocks]
         columns = []
         for block in blocks:
             n, width = len(block.dofs), np.shape(block.coordinates)[1]
-            columns.append(Column(block.name, width, _one(n), np.ones(n)))
-        return Moves(columns)
+            columns.append(InputColumn(block.name, width, _one(n), np.ones(n)))
+        return InputSeeds(columns)
 
-    def put(self, statement: Statement, value: Array) -> None:
+    def put(self, statement: ProblemDefinition, value: Array) -> None:
         """See `Input`."""
         for number in self.numbers:
             force = statement.forces[number]
             name = _amount(force)
-            given = {name: _changed(getattr(force.kernel, name), float(value[0]))}
-            kernel: Any = replace(force.kernel, **given)  # type: ignore[arg-type]
+            changes = {name: _changed(getattr(force.kernel, name), float(value[0]))}
+            kernel: Any = replace(force.kernel, **changes)  # type: ignore[arg-type]
             statement.forces[number] = replace(force, kernel=kernel)
 
 
 @dataclass(frozen=True, eq=False)
-class Support:
+class SupportValue:
     """A prescribed value."""
 
     key: Key
@@ -217,27 +217,27 @@ class Support:
         """See `Input`."""
         return np.array([_number(self.conditions[0].value)])
 
-    def moves(self, trail: Trail) -> Moves:
+    def seeds(self, tape: Tape) -> InputSeeds:
         """See `Input`."""
-        held, system, step = [], trail.system, trail.step
+        prescribed, system, step = [], tape.system, tape.step
         for c in self.conditions:
-            given = c.value if callable(c.value) else 1.0
-            rates = amount(given, system.mesh.points[c.nodes], step.t, step.factor)
+            unit_value = c.value if callable(c.value) else 1.0
+            rates = amount(unit_value, system.mesh.points[c.nodes], step.t, step.factor)
             numbers = system.numbering.nodal[c.name][c.nodes]
-            there = numbers >= 0
-            held.append(Held(numbers[there], _one(int(there.sum())), rates[there]))
-        return Moves(held=held)
+            mask = numbers >= 0
+            prescribed.append(PrescribedSeeds(numbers[mask], _one(int(mask.sum())), rates[mask]))
+        return InputSeeds(prescribed=prescribed)
 
-    def put(self, statement: Statement, value: Array) -> None:
+    def put(self, statement: ProblemDefinition, value: Array) -> None:
         """See `Input`."""
         for number in self.numbers:
             condition = statement.conditions[number]
-            given: Any = _changed(condition.value, float(value[0]))
-            statement.conditions[number] = replace(condition, value=given)
+            changed_value: Any = _changed(condition.value, float(value[0]))
+            statement.conditions[number] = replace(condition, value=changed_value)
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class NodeCoordinates:
     """Places of nodes: along an axis, each for itself, or all together along a mode.
 
     weights: (points, dim, k) how the places move with each component. base: its components now.
@@ -256,64 +256,69 @@ class Places:
         """See `Input`."""
         return self.base.copy()
 
-    def moves(self, trail: Trail) -> Moves:
+    def seeds(self, tape: Tape) -> InputSeeds:
         """See `Input`."""
-        columns: list[Column] = []
-        for block in trail.system.blocks.values():
+        columns: list[InputColumn] = []
+        for block in tape.system.blocks.values():
             if block.kernel.coordinates:
                 columns += self._of_nodes(block.name, block.nodes)
-        there = {b.name: b for b in trail.problem.assembler.blocks}
-        statement = trail.system.statement
+        element_blocks = {b.name: b for b in tape.problem.assembler.blocks}
+        statement = tape.system.statement
         assert statement is not None
-        known = {*trail.system.blocks, *(f.label for f in statement.forces)}
-        for name in there:
-            if name not in known:
+        names = {*tape.system.blocks, *(f.label for f in statement.forces)}
+        for name in element_blocks:
+            if name not in names:
                 raise StudyError(f"by: places of nodes are not followed through {name!r}")
         for force in statement.forces:
             if isinstance(force.kernel, Tie) and callable(force.kernel.offset):
                 raise StudyError(f"{force.label}: an offset that depends on places is not followed")
-            if force.label in there and not isinstance(force.kernel, Spring | Tie):
-                still = isinstance(force.kernel, NodalForce) and not callable(force.kernel.value)
-                columns += [] if still else self._of_nodes(force.label, force.nodes)
-        return Moves(columns, [*self._held(trail)])
+            if force.label in element_blocks and not isinstance(force.kernel, Spring | Tie):
+                independent = isinstance(force.kernel, NodalForce) and not callable(
+                    force.kernel.value
+                )
+                columns += [] if independent else self._of_nodes(force.label, force.nodes)
+        return InputSeeds(columns, [*self._prescribed(tape)])
 
-    def put(self, statement: Statement, value: Array) -> None:
+    def put(self, statement: ProblemDefinition, value: Array) -> None:
         """See `Input`."""
-        points, there = statement.mesh.points.astype(np.float64), self.targets >= 0
-        moved = (value - self.base)[self.targets[there]]
-        points[there] += moved[:, None] * self.directions[there]
+        points, mask = statement.mesh.points.astype(np.float64), self.targets >= 0
+        moved = (value - self.base)[self.targets[mask]]
+        points[mask] += moved[:, None] * self.directions[mask]
         statement.mesh = replace(statement.mesh, points=points)
 
-    def _of_nodes(self, name: str, nodes: Integers) -> Iterator[Column]:
+    def _of_nodes(self, name: str, nodes: Integers) -> Iterator[InputColumn]:
         for k in range(nodes.shape[1]):
             for axis in range(self.mesh.dimension):
                 factor = self.directions[nodes[:, k], axis]
                 if factor.any():
-                    place = k * self.mesh.dimension + axis
-                    yield Column(name, place, self.targets[nodes[:, k]], factor)
+                    column = k * self.mesh.dimension + axis
+                    yield InputColumn(name, column, self.targets[nodes[:, k]], factor)
 
-    def _held(self, trail: Trail) -> Iterator[Held]:
+    def _prescribed(self, tape: Tape) -> Iterator[PrescribedSeeds]:
         """Functions of places that prescribe values."""
-        step, wide = trail.step, _WIDE * float(np.ptp(self.mesh.points, axis=0).max())
-        for c in trail.system.conditions:
+        step, wide = tape.step, _WIDE * float(np.ptp(self.mesh.points, axis=0).max())
+        for c in tape.system.conditions:
             if not callable(c.value):
                 continue
-            numbers = trail.system.numbering.nodal[c.name][c.nodes]
-            there = numbers >= 0
-            nodes = c.nodes[there]
-            places, along = self.mesh.points[nodes], wide * self.directions[nodes]
+            numbers = tape.system.numbering.nodal[c.name][c.nodes]
+            mask = numbers >= 0
+            nodes = c.nodes[mask]
+            coordinates, along = self.mesh.points[nodes], wide * self.directions[nodes]
             rates = np.zeros(len(nodes))
             for k, weight in ((1, 45.0), (2, -9.0), (3, 1.0)):
-                ahead, behind = (
-                    amount(c.value, places + s * k * along, step.t, step.factor) for s in (1, -1)
+                ahead, backward = (
+                    amount(c.value, coordinates + s * k * along, step.t, step.factor)
+                    for s in (1, -1)
                 )
-                rates += weight / (60.0 * wide) * (ahead - behind)
-            yield Held(numbers[there], self.targets[nodes], rates)
+                rates += weight / (60.0 * wide) * (ahead - backward)
+            yield PrescribedSeeds(numbers[mask], self.targets[nodes], rates)
 
 
-def varied(statement: Statement, changes: Sequence[tuple[Input, Array]]) -> Statement:
+def varied_definition_of(
+    statement: ProblemDefinition, changes: Sequence[tuple[Input, Array]]
+) -> ProblemDefinition:
     """A copy of a statement with other values of inputs."""
-    changed = statement.copied()
+    changed = statement.copy()
     for item, value in changes:
         item.put(changed, value)
     return changed
@@ -323,18 +328,18 @@ def _one(n: int) -> Integers:
     return np.zeros(n, dtype=np.int64)
 
 
-def _number(given: Any) -> float:
+def _number(value: Any) -> float:
     """A number itself, 1 for a function."""
-    return 1.0 if callable(given) else float(given)
+    return 1.0 if callable(value) else float(value)
 
 
-def _changed(given: Any, value: float) -> float | Callable[..., Any]:
+def _changed(current: Any, value: float) -> float | Callable[..., Any]:
     """Another number, or a multiple of a function."""
-    if not callable(given):
+    if not callable(current):
         return value
 
     def multiple(*arguments: Any) -> Any:
-        return value * np.asarray(given(*arguments))
+        return value * np.asarray(current(*arguments))
 
     return multiple
 

@@ -10,112 +10,114 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.equations.interpolation import shares
+from softehl.runtime.equations.interpolation import interpolation_weights
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.mesh import MeshError, place_text
-from softehl.runtime.sensitivity.linearised_step import Linear
-from softehl.runtime.sensitivity.tape import Trail
-from softehl.runtime.suggestions import listed, meant
+from softehl.runtime.sensitivity.linearised_step import LinearisedStep
+from softehl.runtime.sensitivity.tape import Tape
+from softehl.runtime.suggestions import did_you_mean, join_names
 
 
 class Quantity(Protocol):
     """A number that a converged step has."""
 
-    def value(self, trail: Trail) -> float:
+    def value(self, tape: Tape) -> float:
         """The number."""
         ...
 
-    def slope(self, linear: Linear) -> Array:
+    def slope(self, linear: LinearisedStep) -> Array:
         """Its derivative by all unknowns, (n,)."""
         ...
 
-    def weights(self, linear: Linear) -> Array:
+    def weights(self, linear: LinearisedStep) -> Array:
         """Weights (n,) with which it counts the forces that make reactions, zero if it does not."""
         ...
 
 
 @dataclass(frozen=True)
-class AtPlace:
+class PointValue:
     """An unknown at a place of the undeformed mesh."""
 
     name: str
-    place: tuple[float, ...]
+    point: tuple[float, ...]
 
-    def value(self, trail: Trail) -> float:
+    def value(self, tape: Tape) -> float:
         """See `Quantity`."""
-        return float(self._shares(trail.system) @ trail.x)
+        return float(self._weights(tape.system) @ tape.x)
 
-    def slope(self, linear: Linear) -> Array:
+    def slope(self, linear: LinearisedStep) -> Array:
         """See `Quantity`."""
-        return self._shares(linear.trail.system)
+        return self._weights(linear.tape.system)
 
-    def _shares(self, system: System) -> Array:
+    def _weights(self, system: System) -> Array:
         """Weights (n,) of all unknowns."""
         _require(self.name, system)
-        place, found = np.asarray(self.place, dtype=np.float64), np.zeros(system.size)
-        known = shares(system, place)
-        if known is None:
-            raise MeshError(f"{place_text(place)} lies outside the mesh")
-        if self.name not in known:
-            raise StudyError(f"no {self.name} at {place_text(place)}; there are {listed(known)}")
-        numbers, weights = known[self.name]
-        np.add.at(found, numbers, weights)
-        return found
+        point, weights_of_all = np.asarray(self.point, dtype=np.float64), np.zeros(system.size)
+        by_unknown = interpolation_weights(system, point)
+        if by_unknown is None:
+            raise MeshError(f"{place_text(point)} lies outside the mesh")
+        if self.name not in by_unknown:
+            raise StudyError(
+                f"no {self.name} at {place_text(point)}; there are {join_names(by_unknown)}"
+            )
+        numbers, weights = by_unknown[self.name]
+        np.add.at(weights_of_all, numbers, weights)
+        return weights_of_all
 
-    def weights(self, linear: Linear) -> Array:
+    def weights(self, linear: LinearisedStep) -> Array:
         """See `Quantity`."""
-        return np.zeros(linear.trail.system.size)
+        return np.zeros(linear.tape.system.size)
 
 
 @dataclass(frozen=True)
-class Reaction:
+class ReactionSum:
     """The sum of reactions at a side."""
 
     name: str
     side: str
 
-    def value(self, trail: Trail) -> float:
+    def value(self, tape: Tape) -> float:
         """See `Quantity`."""
-        linear = Linear(trail)
+        linear = LinearisedStep(tape)
         return float(self.weights(linear) @ linear.forces())
 
-    def slope(self, linear: Linear) -> Array:
+    def slope(self, linear: LinearisedStep) -> Array:
         """See `Quantity`."""
         return linear.by_unknowns(self.weights(linear))
 
-    def weights(self, linear: Linear) -> Array:
+    def weights(self, linear: LinearisedStep) -> Array:
         """See `Quantity`."""
-        system = linear.trail.system
+        system = linear.tape.system
         _require(self.name, system)
         numbers, found = system.numbering.nodal[self.name], np.zeros(system.size)
-        there = numbers[system.mesh.nodes(self.side)]
-        found[there[there >= 0]] = 1.0
+        side_dofs = numbers[system.mesh.nodes(self.side)]
+        found[side_dofs[side_dofs >= 0]] = 1.0
         return found
 
 
 @dataclass(frozen=True)
-class Function:
+class UserQuantity:
     """A function of all unknowns (n,) that returns its value and its gradient (n,)."""
 
     function: Callable[[Array], tuple[float, Array]]
 
-    def value(self, trail: Trail) -> float:
+    def value(self, tape: Tape) -> float:
         """See `Quantity`."""
-        return float(self.function(trail.x)[0])
+        return float(self.function(tape.x)[0])
 
-    def slope(self, linear: Linear) -> Array:
+    def slope(self, linear: LinearisedStep) -> Array:
         """See `Quantity`."""
-        found = np.asarray(self.function(linear.trail.x)[1], dtype=np.float64)
-        if found.shape != linear.trail.x.shape:
+        gradient = np.asarray(self.function(linear.tape.x)[1], dtype=np.float64)
+        if gradient.shape != linear.tape.x.shape:
             raise StudyError(
-                f"the gradient of a quantity has the shape {found.shape}, must be "
-                f"{linear.trail.x.shape}"
+                f"the gradient of a quantity has the shape {gradient.shape}, must be "
+                f"{linear.tape.x.shape}"
             )
-        return found
+        return gradient
 
-    def weights(self, linear: Linear) -> Array:
+    def weights(self, linear: LinearisedStep) -> Array:
         """See `Quantity`."""
-        return np.zeros(len(linear.trail.x))
+        return np.zeros(len(linear.tape.x))
 
 
 def quantity(
@@ -125,17 +127,17 @@ def quantity(
 ) -> Quantity:
     """A quantity as it was asked for.  Raises StudyError."""
     if callable(what):
-        return Function(what)
+        return UserQuantity(what)
     if (at is None) == (reaction is None):
         raise StudyError(
             f"sensitivity({what!r}): give at=(x, y), a place, or reaction=..., a side: one of them"
         )
-    return Reaction(what, reaction) if at is None and reaction is not None else _at(what, at)
+    return ReactionSum(what, reaction) if at is None and reaction is not None else _at(what, at)
 
 
-def _at(name: str, at: tuple[float, ...] | None) -> AtPlace:
+def _at(name: str, at: tuple[float, ...] | None) -> PointValue:
     try:
-        return AtPlace(name, tuple(float(c) for c in at or ()))
+        return PointValue(name, tuple(float(c) for c in at or ()))
     except (TypeError, ValueError):
         raise StudyError(f"at={at!r}: a place is a tuple of numbers, (48, 60)") from None
 
@@ -143,4 +145,6 @@ def _at(name: str, at: tuple[float, ...] | None) -> AtPlace:
 def _require(name: str, system: System) -> None:
     nodal = system.numbering.nodal
     if name not in nodal:
-        raise StudyError(f"no unknown {name!r}{meant(name, nodal)}; at nodes: {listed(nodal)}")
+        raise StudyError(
+            f"no unknown {name!r}{did_you_mean(name, nodal)}; at nodes: {join_names(nodal)}"
+        )

@@ -31,20 +31,20 @@ class WithoutMatrix(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Trail:
+class Tape:
     """A converged step: its equations, its unknowns x (n,), and the step before it.
 
-    before: None at the beginning, and where the path was not recorded. kept: the linear solver of
-    the path with the factors of its latest step, None if it was not recorded. linear: the solver of
-    the path if it iterates. memo: factors that may be needed again. kept and memo save time only.
+    previous: None at the beginning, and if the path was not recorded. last_factors: the linear
+    solver of the path with the factors of its latest step, None if it was not recorded. linear: the
+    solver of the path if it iterates. memo: factors that may be needed again. Both save time only.
     """
 
     system: System
     step: Step
-    posed: Any
+    distributed_problem: Any
     x: Array
-    before: Trail | None = None
-    kept: LastFactorisation | None = None
+    previous: Tape | None = None
+    last_factors: LastFactorisation | None = None
     linear: LinearSolver | None = None
     memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
@@ -54,23 +54,27 @@ class Trail:
 
     def __getstate__(self) -> dict[str, Any]:
         """For `copy` and `pickle`: this step alone, without what only saves time."""
-        return {**vars(self), "before": None, "kept": None, "linear": None, "memo": {}}
+        return {**vars(self), "previous": None, "last_factors": None, "linear": None, "memo": {}}
 
     @property
     def problem(self) -> Problem:
         """Its equations, with a matrix."""
-        posed = self.posed.equations if isinstance(self.posed, WithoutMatrix) else self.posed
+        posed = (
+            self.distributed_problem.equations
+            if isinstance(self.distributed_problem, WithoutMatrix)
+            else self.distributed_problem
+        )
         assert isinstance(posed, Problem)
         return posed
 
-    def chain(self) -> list[Trail]:
+    def chain(self) -> list[Tape]:
         """The steps on which the unknowns depend, first to last.
 
         One alone where nothing remembers the step before. Raises StudyError where a step is missing
         or the study was changed.
         """
         system = self.system
-        if not isinstance(self.posed, Problem | WithoutMatrix):
+        if not isinstance(self.distributed_problem, Problem | WithoutMatrix):
             raise StudyError(
                 'derivatives need engine="serial": this result is of several processes'
             )
@@ -82,13 +86,13 @@ class Trail:
                 "friction between bodies is not followed through several steps: derivatives need "
                 "solve(steps=1) from rest, or contacts without friction"
             )
-        if not remembers(system):
+        if not depends_on_previous(system):
             return [self]
-        steps: list[Trail] = []
-        step: Trail | None = self
+        steps: list[Tape] = []
+        step: Tape | None = self
         while step is not None:
             steps.append(step)
-            step = step.before
+            step = step.previous
         if not _at_rest(steps[-1]):
             raise StudyError(
                 "the result depends on the steps before it, which were not recorded: give "
@@ -98,28 +102,28 @@ class Trail:
         return steps[::-1]
 
 
-def remembers(system: System) -> bool:
+def depends_on_previous(system: System) -> bool:
     """True if a step depends on the steps before it."""
     blocks = system.blocks.values()
     return any(b.previous or b.rates or b.initial is not None for b in blocks)
 
 
-def continued(system: System, start: Trail | None) -> Trail | None:
+def continued_tape(system: System, start: Tape | None) -> Tape | None:
     """The path that goes on from a start: None where that is of another study."""
     if start is None or start.system.statement is not system.statement:
         return None
     return start if start.system.written == system.written else None
 
 
-def _at_rest(first: Trail) -> bool:
+def _at_rest(first: Tape) -> bool:
     """True if a step begins with the values that the study says of the start."""
-    rest = first.system.histories()
-    same = [np.array_equal(first.step.histories[name], values) for name, values in rest.items()]
+    initial = first.system.histories()
+    same = [np.array_equal(first.step.histories[name], values) for name, values in initial.items()]
     return all(same) and np.array_equal(first.step.old, first.system.at_rest())
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
+class TimeCoupling:
     """Data of a block that are values of steps before.
 
     column: among coordinates, data and parameters. numbers: (n,) unknowns whose values they are.
@@ -132,18 +136,18 @@ class Carried:
     weights: tuple[float, ...]
 
 
-def carried(trail: Trail) -> Iterator[Carried]:
+def time_couplings(tape: Tape) -> Iterator[TimeCoupling]:
     """Values from steps before in the data of a step."""
-    nodal = trail.system.numbering.nodal
-    for block in trail.system.blocks.values():
+    nodal = tape.system.numbering.nodal
+    for block in tape.system.blocks.values():
         first = block.kernel.nodes * len(block.kernel.coordinates)
-        for slots, weights in ((block.previous, (1.0,)), (block.rates, trail.step.weights)):
+        for slots, weights in ((block.previous, (1.0,)), (block.rates, tape.step.weights)):
             for name, slot in slots.items():
                 numbers = nodal[slot.name][block.nodes[:, slot.node or 0]]
                 column = first + block.kernel.data.index(name)
-                yield Carried(block.name, column, numbers, weights)
+                yield TimeCoupling(block.name, column, numbers, weights)
 
 
-def remembering(trail: Trail) -> list[str]:
+def blocks_with_history(tape: Tape) -> list[str]:
     """Blocks whose points have data of their own."""
-    return [b.name for b in trail.system.blocks.values() if b.initial is not None]
+    return [b.name for b in tape.system.blocks.values() if b.initial is not None]

@@ -53,7 +53,7 @@ def test_multigrid_finds_what_factors_find(make: Any) -> None:
 def iterations(study: softehl.Study, motions: int = 6) -> int:
     """Of conjugate gradients at rest, with multigrid that is told so many rigid motions."""
     system = study.system()
-    problem = system.problem(system.still(1.0, system.at_rest(), {}))
+    problem = system.problem(system.quasi_static_step(1.0, system.at_rest(), {}))
     r, K = problem.linearise(system.at_rest())
     modes = linear_solver_choice.near_nullspace(system)
     assert modes is not None
@@ -103,7 +103,7 @@ def test_grids_serve_the_tangents_of_a_path(monkeypatch: pytest.MonkeyPatch) -> 
     assert cube().solve(linear="amg").iterations > 2
     assert len(made) == 1
     system = cube().system()
-    problem = system.problem(system.still(1.0, system.at_rest(), {}))
+    problem = system.problem(system.quasi_static_step(1.0, system.at_rest(), {}))
     r, K = problem.linearise(system.at_rest())
     modes = linear_solver_choice.near_nullspace(system)
     assert modes is not None

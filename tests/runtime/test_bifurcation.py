@@ -11,7 +11,7 @@ import sympy as sp
 from scipy.special import ellipe, ellipk
 
 from softehl import Definition, Model, quadrature
-from softehl.runtime.analyses.bifurcation import MissedBifurcations, place
+from softehl.runtime.analyses.bifurcation import MissedBifurcations, critical_point
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.study import Study, StudyError
 from tests.runtime.field_pages import rubber_by_log as rubber
@@ -126,7 +126,7 @@ def test_what_is_refused() -> None:
 
 def test_what_is_nearly_singular_is_looked_for_with_contact() -> None:
     result = resting().solve()
-    sought = result.system.problem(result.system.still(1.0, result.x, {}))
-    found = place(sought, 1.0, result.x)
+    sought = result.system.problem(result.system.quasi_static_step(1.0, result.x, {}))
+    found = critical_point(sought, 1.0, result.x)
     assert abs(found.value) > 1e-3  # without contact the block is free
-    assert found.value == pytest.approx(place(sought.at(result.x), 1.0, result.x).value)
+    assert found.value == pytest.approx(critical_point(sought.at(result.x), 1.0, result.x).value)

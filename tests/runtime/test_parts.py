@@ -52,7 +52,7 @@ def parts(system: System, found: Partition) -> list[LocalSystem]:
 
 
 def residual(system: System, x: Array) -> Array:
-    problem = system.problem(system.still(0.7, np.zeros(system.size), {}))
+    problem = system.problem(system.quasi_static_step(0.7, np.zeros(system.size), {}))
     return problem.assembler.residual(x, problem.parameters)
 
 
@@ -103,11 +103,13 @@ def test_prescribed_values_are_those_of_the_whole(rng: np.random.Generator) -> N
     study.add("body", pages.solid(), mu=0.4, lame=1.5, thickness=1.0)
     study.fix("left", u_x=0.0, u_y=lambda x, t: x[:, 1] - x[:, 1].mean())
     system = study.system()
-    whole = system.problem(system.still(1.0, np.zeros(system.size), {}))
+    whole = system.problem(system.quasi_static_step(1.0, np.zeros(system.size), {}))
     known = dict(zip(whole.fixed.tolist(), whole.values.tolist(), strict=True))
     there: dict[int, float] = {}
     for part in parts(system, cut(system, rng)):
-        problem = part.system.problem(part.system.still(1.0, np.zeros(part.system.size), {}))
+        problem = part.system.problem(
+            part.system.quasi_static_step(1.0, np.zeros(part.system.size), {})
+        )
         there |= zip(part.unknowns[problem.fixed].tolist(), problem.values.tolist(), strict=True)
     assert there == known
 

@@ -88,7 +88,7 @@ def test_the_tangent_is_the_derivative(orders: tuple[int, int], geometry: str) -
     study.fix("upper:top", u_x=0.05, u_y=-0.2)
     result = study.solve(steps=2)
     system = result.system
-    problem = system.problem(system.still(1.0, result.x, {}))
+    problem = system.problem(system.quasi_static_step(1.0, result.x, {}))
     rng = np.random.default_rng(1)
     x = result.x.copy()
     for name in ("u_x", "u_y"):

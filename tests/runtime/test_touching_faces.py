@@ -135,7 +135,7 @@ def off_tangent(result: Result, slide: float, seed: int) -> float:
     slide: of the whole upper body along (3, 2, 0) since the result, from which slip counts.
     """
     system, rng = result.system, np.random.default_rng(seed)
-    problem = system.problem(system.still(1.0, result.x, {}))
+    problem = system.problem(system.quasi_static_step(1.0, result.x, {}))
     x = result.x.copy()
     for name in ("u_x", "u_y", "u_z"):
         part = system.numbering.layout.part(name)

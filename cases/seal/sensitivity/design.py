@@ -31,7 +31,7 @@ from softehl.cases.seal.states.state import FilmState, Observer
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.newton import Newton, NonlinearProblem
-from softehl.runtime.suggestions import meant
+from softehl.runtime.suggestions import did_you_mean
 
 TOLERANCE = 0.01
 """Of the quantity, relative: about what two meshes of neighbouring values differ by."""
@@ -66,7 +66,7 @@ class Target:
         """From "friction -10 %".  Raises NoDesignError."""
         found = _TARGET.fullmatch(text.strip().replace("h*", "h_star"))
         if not found or found["name"] not in QUANTITIES or float(found["change"]) <= -100.0:
-            hint = meant(found["name"], QUANTITIES) if found else ""
+            hint = did_you_mean(found["name"], QUANTITIES) if found else ""
             raise NoDesignError(
                 f'the target "{text}" is not understood{hint}; allowed: a change in per cent of '
                 f'{", ".join(QUANTITIES)}, as in "friction -10%"'
@@ -290,7 +290,7 @@ def design_case(p: Seal, target: str, key: str, observer: Observer) -> Design:
     base, _ = BASES.get(asked, (asked, asked))
     known = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
     if base not in known:
-        hint = f" ({INSTEAD[base]})" if base in INSTEAD else meant(base, known)
+        hint = f" ({INSTEAD[base]})" if base in INSTEAD else did_you_mean(base, known)
         raise BadInput(f"--by {base}{hint}: allowed: {', '.join([*known, *BASES])}")
     p = _one_film(p)
     by, wanted = Lever(asked if asked in BASES else p.called(base), base), Target.of(target)

@@ -18,7 +18,7 @@ from softehl.runtime.mesh.cells import BY_FILE, CELLS, for_vtk, jacobians
 from softehl.runtime.mesh.mesh import Mesh, MeshError
 from softehl.runtime.mesh.readers import abaqus, gmsh
 from softehl.runtime.mesh.readers.file_content import Content
-from softehl.runtime.suggestions import listed
+from softehl.runtime.suggestions import join_names
 
 _DEFECTS = (
     *(OSError, ValueError, KeyError, IndexError, TypeError, AssertionError, SystemExit),
@@ -206,7 +206,7 @@ def mesh_of(content: Content, points: Array, top: int) -> tuple[Mesh, Integers]:
             del sides[name]
     if lost:
         warn(
-            f"{listed(map(repr, lost))}: nodes of none of the cells of the mesh are left out",
+            f"{join_names(map(repr, lost))}: nodes of none of the cells of the mesh are left out",
             stacklevel=4,
         )
     main = {kind: number[nodes] for kind, nodes in main.items()}
@@ -253,8 +253,8 @@ def _write_by_meshio(mesh: Mesh, points: Array, path: Path) -> None:
         cells, flags, data = _flagged(mesh, "" if path.suffix == ".vtk" else _PLAIN)
     elif mesh.groups or mesh.sides:
         warn(
-            f"{path.name}: names are not written ({listed([*mesh.groups, *mesh.sides])}); .msh, "
-            ".inp, .vtu and .vtk keep them",
+            f"{path.name}: names are not written ({join_names([*mesh.groups, *mesh.sides])}); "
+            ".msh, .inp, .vtu and .vtk keep them",
             stacklevel=4,
         )
     blocks = [(CELLS[kind].meshio, nodes) for kind, nodes in cells.items()]
