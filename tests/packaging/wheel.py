@@ -103,8 +103,13 @@ def main() -> int:
 def _sdist(trial: Trial) -> Path:
     """Folder of the unpacked source distribution."""
     copy = trial.place / "tree"
-    hidden = (".*", "build", "dist", "results", "__pycache__", "*.egg-info", "*.so", "*.sha256")
-    shutil.copytree(ROOT, copy, symlinks=True, ignore=shutil.ignore_patterns(*hidden))
+    hidden = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "*.so", "*.sha256")
+
+    def ignored(folder: str, names: list[str]) -> set[str]:
+        outputs = {"build", "dist", "results"} if Path(folder) == ROOT else set()
+        return {*hidden(folder, names)} | outputs & {*names}
+
+    shutil.copytree(ROOT, copy, symlinks=True, ignore=ignored)
     code = "from setuptools.build_meta import build_sdist; build_sdist('..')"
     trial.run("sdist", [sys.executable, "-c", code], folder=copy)
     shutil.rmtree(copy)
