@@ -250,20 +250,6 @@ def test_a_given_derivative_replaces_the_true_one() -> None:
         assert same_value(linear.derivative(root, k), expected, AT)
 
 
-def test_a_given_derivative_can_be_the_chain_rule_by_hand() -> None:
-    """Given with respect to a named value, differentiation goes on below that."""
-    g = Graph()
-    x, y, _ = wrt = unknowns(g, 3)
-    inner = g.name("t", g.mul(x, y))
-    outer = g.name("e", g.call(Op.EXP, inner))
-    given_ = {outer: {inner: outer}}
-    root = g.mul(outer, y)
-    adjoint = gradient(g, root, wrt, prescribed=given_)
-    linear = Linearisation(g, wrt, prescribed=given_)
-    assert right([adjoint[u] for u in wrt], root, AT)
-    assert right([linear.derivative(root, j) for j in range(3)], root, AT)
-
-
 # --------------------------------------------------------------------- models: sums and interfaces
 
 RULE = [(mpmath.mpf(t), mpmath.mpf(w)) for t, w in (("-0.7", "0.6"), ("0.1", "0.9"), ("0.8", "1"))]

@@ -189,21 +189,6 @@ def test_tangents_are_differences_of_the_energy_in_50_digits(
     assert np.abs(found[-1] - wrong).max() > 1e-11 * np.abs(tangent).max()
 
 
-def test_the_check_of_kernels_reads_the_page_of_a_point_kernel(tmp_path: Path) -> None:
-    def other(m: Fields) -> None:
-        field_pages.rubber.write(m)
-        m.minimise(m.position[0] * sp.Symbol("mu", real=True) / 10**6)
-
-    tasks = ["energy", "residual", "tangent"]
-    d = field_pages.rubber.definition("quad9")
-    wrong = replace(field_pages.rubber, write=other).definition("quad9")
-    for definition, folder in ((d, tmp_path / "right"), (wrong, tmp_path / "wrong")):
-        compiled(definition, folder)
-    right = verification.check(d, tasks, tmp_path / "right" / build.LIBRARY).errors
-    assert max(right.values()) < 1e-13
-    assert verification.check(d, tasks, tmp_path / "wrong" / build.LIBRARY).errors["energy"] > 1e-10
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "cell",

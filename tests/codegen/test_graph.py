@@ -10,30 +10,6 @@ from softehl.codegen.graph.graph import Graph, Op
 from tests.codegen.workshop import unknowns
 
 
-def test_equal_expressions_are_one_node() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    before = len(g)
-    first = g.call(Op.LOG, g.add(g.mul(x, y), g.const(3)))
-    size = len(g)
-    second = g.call(Op.LOG, g.add(g.mul(x, y), g.const(3)))
-    assert first is second
-    assert len(g) == size == before + 4  # 3, x y, x y + 3, log
-
-
-def test_what_differs_is_not_one_node() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    assert x is not y
-    assert g.sub(x, y) is not g.sub(y, x)
-    assert g.power(x, Fraction(1, 2)) is not g.power(x, Fraction(1, 3))
-    assert g.name("a", x) is not g.name("b", x)
-    assert g.name("a", x) is g.name("a", x)
-    assert g.input("dofs", 0) is not g.input("data", 0)
-    assert g.input("dofs", 0) is not g.input("dofs", 0, varying=True)
-    assert g.compare(Op.LT, x, y) is not g.compare(Op.LE, x, y)
-
-
 def test_constants_are_exact() -> None:
     g = Graph()
     third = g.const(Fraction(1, 3))
@@ -91,40 +67,3 @@ def test_even_root_of_an_even_power_is_not_the_base() -> None:
     root = g.power(square, Fraction(1, 2))
     assert root.op is Op.POW
     assert root.args == (square,)
-
-
-def test_signs_are_pulled_outwards() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    minus_x, minus_y = g.neg(x), g.neg(y)
-    assert g.neg(minus_x) is x
-    assert g.neg(g.sub(x, y)) is g.sub(y, x)
-    assert g.add(x, minus_y) is g.add(minus_y, x) is g.sub(x, y)
-    assert g.add(minus_x, minus_y) is g.neg(g.add(x, y))
-    assert g.sub(x, minus_y) is g.add(x, y)
-    assert g.sub(minus_x, y) is g.neg(g.add(x, y))
-    assert g.sub(g.zero, x) is minus_x
-    assert g.mul(minus_x, y) is g.mul(x, minus_y) is g.neg(g.mul(x, y))
-    assert g.mul(minus_x, minus_y) is g.mul(x, y)
-    assert g.mul(g.const(-2), x) is g.neg(g.mul(g.const(2), x))
-    assert g.recip(minus_x) is g.neg(g.recip(x))
-    assert g.sum(minus_x) is g.neg(g.sum(x))
-    assert g.neg(g.const(5)).value == -5
-
-
-def test_varying_follows_the_operands_up_to_a_sum() -> None:
-    g = Graph()
-    (x,) = unknowns(g, 1)
-    xi = g.input("rule", 0, varying=True)
-    inside = g.mul(x, g.call(Op.EXP, xi))
-    assert not x.varying
-    assert xi.varying
-    assert inside.varying
-    total = g.sum(inside)
-    assert not total.varying
-    assert not g.add(total, x).varying
-    assert g.mul(total, xi).varying
-    condition = g.compare(Op.LT, xi, x)
-    assert condition.varying
-    assert g.branch(condition, x, g.zero).varying
-    assert g.name("n", inside).varying

@@ -7,7 +7,6 @@ import math
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -273,18 +272,6 @@ def test_exponentials_and_logarithms_at_their_ends(
 
 
 # ---------------------------------------------------------------------- what the generator chooses
-
-
-def test_short_loops_are_written_out_and_long_ones_are_not(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    short = pipeline.compile_task(branched(), "tangent")
-    assert short.best.unrolled
-    assert short.best.operations == min(a.operations for a in short.attempts)
-    kept = pipeline.compile_task(replace(branched(), unroll=False), "tangent")
-    assert not any(a.unrolled for a in kept.attempts)
-    monkeypatch.setattr(pipeline, "SHORT", 10)
-    assert not pipeline.compile_task(branched(), "tangent").best.unrolled
 
 
 def test_a_long_file_is_compiled_lightly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ import sympy as sp
 from softehl.codegen import pipeline
 from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.evaluation import State
-from softehl.codegen.graph.graph import Graph, Op
+from softehl.codegen.graph.graph import Graph
 from softehl.codegen.graph.traversal import Recursion, recursion
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.errors import ModelError
@@ -69,19 +69,6 @@ def test_values_of_a_long_page_are_those_of_the_oracle(
 def test_ten_thousand_names() -> None:
     functions = pipeline.compile_model(chain(10_000, "residual")).functions
     assert functions["residual"].best.operations > 10_000
-
-
-def test_a_deep_expression_is_lowered() -> None:
-    g = Graph()
-    x = sp.Symbol("x", real=True)
-    deep = x
-    for _ in range(3_000):
-        deep = sp.sin(deep, evaluate=False)
-    node = Lowering(g, {x: g.input("dofs", 0)})(deep)
-    depth = 0
-    while node.op is Op.SIN:
-        node, depth = node.args[0], depth + 1
-    assert depth == 3_000
 
 
 def test_where_sympy_gives_up_the_page_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -74,26 +74,6 @@ def test_rates_of_another_unknown_are_missed() -> None:
         m.finish()
 
 
-@pytest.mark.parametrize(
-    ("nodes", "rule"),
-    [
-        (3, GAUSS),
-        (4, quadrature.gauss(2, 3)),
-        (9, quadrature.gauss(3, 3)),
-        (6, quadrature.wedge(2)),
-        (2, quadrature.gauss(2, 3)),
-    ],
-)
-def test_a_middle_surface_is_integrated_over_its_thickness(
-    nodes: int, rule: QuadratureRule
-) -> None:
-    m = Model("shell", nodes=nodes, rule=rule)
-    (u,) = m.nodal_unknowns("u")
-    depth = m.point()[-1]
-    m.potential(m.integral("Pi", sum(depth * v**2 + v for v in u)))
-    m.finish()
-
-
 def test_an_integrand_without_detJ_is_warned_of_with_the_line() -> None:
     m, u, e = page("quad4")
     F = kinematics.deformation_gradient(m, e.dN, u)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from softehl.codegen.elements import shapes
 from softehl.codegen.language.definition import Definition
@@ -113,16 +112,6 @@ def test_spring_in_both_branches(u: tuple[float, float], closed: bool, a_spring:
 # ---------------------------------------------------------------------------------------- Maxwell
 
 
-def stepped(kernel: Kernel, u: Array, steps: int, **changed: float) -> Array:
-    """History (1, 4, 4) after `steps` at a fixed deformation, from rest."""
-    history = AT_REST[None]
-    for _ in range(steps):
-        history = kernel.fields_at(
-            SQUARE.reshape(1, 8), u, parameters={**MAXWELL, **changed}, point_data=history
-        )
-    return history
-
-
 def test_maxwell_in_closed_form(a_maxwell: Made, rng: np.random.Generator) -> None:
     """C_v is the unimodular part of C_v,old + dt/tau Cbar (Shutov et al. 2013)."""
     _, kernel = a_maxwell
@@ -139,27 +128,3 @@ def test_maxwell_in_closed_form(a_maxwell: Made, rng: np.random.Generator) -> No
         step = np.array([[a, d, 0], [d, b, 0], [0, 0, c]]) + 0.5 / 3.0 * C
         step /= np.linalg.det(step) ** (1 / 3)
         np.testing.assert_allclose(now, step[[0, 1, 2, 0], [0, 1, 2, 1]], rtol=0, atol=1e-14)
-
-
-def test_maxwell_flows_to_rest_and_follows_the_differential_equation(a_maxwell: Made) -> None:
-    """At a large fixed shear C_v tends to Cbar; with small steps C_v is the exact solution."""
-    _, kernel = a_maxwell
-    F = np.array([[1.0, 0.9], [0.0, 1.0]])
-    u = moved(SQUARE, F)
-    C = np.eye(3)
-    C[:2, :2] = F.T @ F
-    end = stepped(kernel, u, 60, dt=2.0)
-    np.testing.assert_allclose(end[0, 0], [C[0, 0], C[1, 1], 1.0, C[0, 1]], rtol=1e-12)
-
-    def rate(_: float, v: Array) -> Array:
-        Cv = v.reshape(3, 3)
-        change: Array = (C - np.trace(C @ np.linalg.inv(Cv)) / 3 * Cv) / 3.0
-        return change.ravel()
-
-    exact = solve_ivp(rate, (0, 1.0), np.eye(3).ravel(), rtol=1e-11, atol=1e-12).y[:, -1]
-    errors = [
-        np.abs(stepped(kernel, u, n, dt=1.0 / n)[0, 0] - exact[[0, 4, 8, 1]]).max()
-        for n in (20, 40, 80)
-    ]
-    orders = np.log2(np.divide(errors[:-1], errors[1:]))
-    np.testing.assert_allclose(orders, 1.0, atol=0.05)

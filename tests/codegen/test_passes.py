@@ -40,26 +40,6 @@ def costs(g: Graph, name: str, root: Node) -> tuple[int, int, int, int]:
 # ------------------------------------------------------------------------------ one pass, one graph
 
 
-def test_an_inverse_next_to_its_root_is_a_power_of_it() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    volume = g.add(g.mul(x, x), g.mul(y, y))
-    root = g.add(g.call(Op.RCBRT, volume), g.recip(volume))
-    alone = g.recip(g.add(x, y))
-    new = passes.inverses(g, [root, alone])
-    assert same_value(new[0], root, AT)
-    assert new[1] is alone
-    check(new)
-    # x x, y y, their sum, its root, its inverse or two products, the sum of both
-    assert (operations([root]), operations([new[0]])) == (6, 7)
-    divisions = [sum(n.op is Op.RECIP for n in reachable([r])) for r in (root, new[0])]
-    assert divisions == [1, 0]
-    straight = passes.straight_line([[Fraction(0), Fraction(2)]], (0, 0))
-    rest = [p for p in straight if p.name != "inverses of roots"]
-    kept = [passes.run(g, [root], p)[0] for p in (straight, rest)]
-    assert [sum(n.op is Op.RECIP for n in reachable(r)) for r in kept] == [0, 1]
-
-
 def test_assume_drops_branches_that_are_decided() -> None:
     g = Graph()
     x, y = unknowns(g, 2)
@@ -149,31 +129,6 @@ def test_common_sums_are_added_once() -> None:
     assert (operations(full), operations(rest)) == (4, 6)
 
 
-def test_loops_are_written_out() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    xi, weight = (g.input("rule", k, varying=True) for k in (0, 1))
-    body = g.mul(weight, g.mul(g.call(Op.EXP, g.mul(x, xi)), g.call(Op.LOG, y)))
-    root = g.mul(g.sum(body), y)
-    rule = (("-1/2", "1/3"), ("0", "2"), ("1", "1"))
-    points = [[Fraction(t), Fraction(w)] for t, w in rule]
-    (straight,) = passes.unrolled(points).apply(g, [root])
-    terms = [g.mul(g.const(w), g.call(Op.EXP, g.mul(x, g.const(t)))) for t, w in points]
-    expected = g.mul(g.mul(g.add(g.add(terms[0], terms[1]), terms[2]), g.call(Op.LOG, y)), y)
-    assert same_value(straight, expected, AT)
-    nodes = reachable([straight])
-    assert Op.SUM not in {n.op for n in nodes}
-    assert not any(n.varying for n in nodes)
-    # log y; x/2, its sign, exp, two products; exp(0) = 1, one product; exp, one product; two sums;
-    # the factor y (with the loop: three products, exp, log and the factor)
-    assert operations([root]) == 6
-    assert operations([straight]) == 12
-    assert schedule([straight]).operations_per_point == 0
-    moved, _ = passes.run(g, [root], passes.straight_line(points))
-    assert operations(moved) < operations([straight])
-    assert close(evaluate(moved[0], AT), evaluate(expected, AT), 1e-15)
-
-
 def test_literals_are_computed_at_compile_time() -> None:
     g = Graph()
     (x,) = unknowns(g, 1)
@@ -193,19 +148,6 @@ def costs_in_double(g: Graph, root: Node) -> tuple[int, int, int, int]:
     for new in (alone, full, rest):
         assert close(evaluate(new, AT), evaluate(root, AT), 2e-16)
     return operations([root]), operations([alone]), operations([full]), operations([rest])
-
-
-def test_literals_keep_exact_constants_exact_and_conditions_logical() -> None:
-    g = Graph()
-    x, y = unknowns(g, 2)
-    root = g.add(g.mul(g.const(Fraction(1, 3)), x), y)
-    assert passes.literals(g, [root]) == [root]
-    decided = g.branch(g.compare(Op.LT, g.pi(), g.const(3)), x, y)
-    assert passes.literals(g, [decided]) == [y]
-    open_ = g.branch(g.compare(Op.LT, g.pi(), x), x, y)
-    (kept,) = passes.literals(g, [open_])
-    check([kept])
-    assert kept.op is Op.BRANCH
 
 
 # --------------------------------------------------------------------------------- all of them

@@ -84,25 +84,6 @@ def test_derivatives_by_arguments(name: str, array: str, index: int, family: Any
     assert off(found, wrong) > 1e-3
 
 
-def test_product_of_an_interpolated_field(tmp_path: Path) -> None:
-    m = Model("field", nodes=1, rule=quadrature.gauss(2, 1))
-    u = m.unknown("u")
-    p, p_xi = m.interpolated("p")
-    (k,) = m.parameters(k="stiffness")
-    m.potential(m.integral("Pi", sp.exp(k * u * p) + p_xi**2 * p * u**2))
-    m.offer(product=True, derivatives=[k])
-    d = m.finish()
-    kernel = compiled(d, tmp_path)
-    rule, dofs = film_rule(2, "gauss"), np.array([[0.7, 0.3, 0.9, -0.2]])
-    given: dict[str, Any] = {"parameters": [1.4], "rule": rule}
-    v = np.array([[0.2, -0.5, 1.1, 0.7]])
-    at = element_state(kernel, (), dofs, **given)
-    found = kernel.product(np.zeros((1, 0)), dofs, v, **given)[0]
-    assert off(found, Oracle(d).product(at, v[0].tolist())) <= 1e-14
-    slope = kernel.derivative("k", np.zeros((1, 0)), dofs, **given)[0]
-    assert off(slope, Oracle(d).derivative(at, "parameters", 0)) <= 1e-14
-
-
 def test_fields_on_different_points_are_refused() -> None:
     with pytest.raises(ValueError, match="each rule needs a basis, and all the same points"):
         several(film_rule(2, "gauss", 3), film_rule(1, "gauss", 2))
@@ -164,26 +145,6 @@ def test_what_cannot_be_offered_is_named(asked: dict[str, Any], message: str) ->
 
 
 # ------------------------------------------------------------------------------------- functions
-
-
-@pytest.mark.parametrize(
-    ("clamp", "slope"),
-    [
-        (lambda x, c: sp.Max(-c, sp.Min(x, c)), 1.0),
-        (lambda x, c: sp.sign(x) * sp.Min(sp.Abs(x), c), 0.0),
-    ],
-)
-def test_the_slope_of_a_clamp_at_zero(
-    clamp: Callable[[Any, Any], Any], slope: float, tmp_path: Path
-) -> None:
-    """What docs/language.md says of kinks: `sign(0)` is 0, and so is the slope of the product."""
-    m = Model("clamp", nodes=1, rule=quadrature.point_rule())
-    x = m.unknown("x")
-    (c,) = m.parameters(c="limit")
-    m.weak_form([(clamp(x, c), x)])
-    kernel = compiled(m.finish(), tmp_path, "-O0")
-    _, K = kernel.tangent(np.empty((1, 0)), np.zeros((1, 1)), parameters=[0.5])
-    assert K.item() == slope
 
 
 FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {

@@ -87,19 +87,6 @@ def test_cells_are_added_to_what_is_there(cells: dict[str, CellKernels]) -> None
         assert once.all()
 
 
-def test_an_energy_is_one_number(cells: dict[str, CellKernels]) -> None:
-    case = CASES["solid_q4: ring"]
-    positional, named = case.arguments()
-    at = order(case)
-    w, vertices, A = np.empty(8), np.zeros((4, 3)), np.array([2.0, 7.0])
-    w[at] = case.dofs
-    vertices[list(TENSOR), :2] = case.coordinates.reshape(4, 2)
-    cells["solid_q4"].add("energy", A, w, case.parameters, vertices)
-    expected = load_kernel("solid_q4").energy(*positional, **named)[0]
-    assert A[0] - 2.0 == pytest.approx(expected, rel=1e-12)
-    assert A[1] == 7.0
-
-
 def assembled(kernels: CellKernels, plane: Plane, vertex: tuple[int, ...]) -> tuple[Array, Array]:
     """Loop over cells in the manner of DOLFINx: gather, call with cleared A, scatter."""
     size, numbers = plane.points.size, np.empty(4, dtype=np.int64)

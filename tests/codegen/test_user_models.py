@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -149,19 +148,6 @@ def test_files_that_cannot_be_read_are_named(capsys: pytest.CaptureFixture[str])
     assert "it is not UTF-8 text" in capsys.readouterr().err
 
 
-def test_running_a_model_leaves_no_trace() -> None:
-    model_file("K = 1\n", "helper_of_mine.py")
-    path, modules, places = (
-        model_file("import helper_of_mine\n" + spring()),
-        set(sys.modules),
-        [*sys.path],
-    )
-    model_loader.definitions(path)
-    assert set(sys.modules) == modules
-    assert sys.path == places
-    assert not Path("__pycache__").exists()
-
-
 # ------------------------------------------------------------------------------- the command line
 
 
@@ -191,32 +177,6 @@ def test_generate_writes_compiles_and_checks(capsys: pytest.CaptureFixture[str])
     assert again.count("cached") == 4
 
 
-def test_check_names_what_is_stale_and_writes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    model_file(spring())
-    assert run("mine.py", "--check") == 1
-    assert not Path("generated").exists()
-    assert run("mine.py") == run("mine.py", "--check") == 0
-    folder = Path("generated/mine")
-    capsys.readouterr()
-
-    source = folder / "spring.c"
-    source.write_text(source.read_text().replace("0.5", "0.6"))
-    assert run("mine.py", "--check") == 1
-    *named, remedy = capsys.readouterr().err.splitlines()
-    assert named == [f"stale: {folder}/spring.c", f"stale: {folder}/{LIBRARY}"]
-    assert remedy == "mend it with: softehl generate mine.py"
-    assert run("mine.py") == run("mine.py", "--check") == 0
-
-    model_file(spring(energy="k * u**2"))
-    capsys.readouterr()
-    assert run("mine.py", "--check") == 1
-    named = capsys.readouterr().err.splitlines()[:-1]
-    assert named == [f"stale: {folder}/{n}" for n in ("spring.c", "manifest.json")]
-    assert run("mine.py") == 0
-    (folder / LIBRARY).unlink()
-    assert run("mine.py", "--check") == 1
-
-
 def test_a_renamed_model_leaves_nothing_behind_and_files_of_others_are_left_alone(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -229,26 +189,6 @@ def test_a_renamed_model_leaves_nothing_behind_and_files_of_others_are_left_alon
     assert run("mine.py", "--out", "own") == 2
     assert "own holds solver.c, which softehl did not write" in capsys.readouterr().err
     assert [p.name for p in Path("own").iterdir()] == ["solver.c"]
-
-
-def test_a_failed_compilation_shows_the_command_and_the_compilers_words(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    compiler = Path("broken-cc").absolute()
-    compiler.write_text(
-        '#!/bin/sh\ncase "$*" in *-dM*) exec cc "$@";; esac\necho no way >&2\nexit 3\n'
-    )
-    compiler.chmod(0o755)
-    monkeypatch.setenv("CC", str(compiler))
-    model_file(spring())
-    assert run("mine.py") == 2
-    printed = capsys.readouterr().err
-    assert "the C compiler failed (3)" in printed
-    assert "broken-cc" in printed
-    assert "no way" in printed
-    monkeypatch.setenv("CC", "no-such-compiler")
-    assert run("mine.py") == 2
-    assert "no C compiler: 'no-such-compiler' is not on the PATH" in capsys.readouterr().err
 
 
 # ------------------------------------------------------------------------------ the tangent check

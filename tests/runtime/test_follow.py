@@ -10,8 +10,6 @@ import sympy as sp
 
 from softehl import Definition, Model, quadrature
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.results.result import Result
-from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.study import Study, StudyError
 
 HEIGHT = 0.2
@@ -112,14 +110,6 @@ def test_a_path_along_which_a_spring_closes_a_gap() -> None:
     (limit,) = path.limits
     assert limit.t == pytest.approx(1.0, abs=1e-3)
     assert not limit.located
-
-
-def test_an_end_that_is_never_reached() -> None:
-    with pytest.raises(NotConverged, match="5 points, the last at load factor") as error:
-        shallow().follow(step=0.01, until=lambda r: False, most=5)
-    reached = error.value.reached
-    assert isinstance(reached, Result)
-    assert reached.t > 0.0
 
 
 def test_what_is_refused() -> None:

@@ -164,24 +164,6 @@ def test_what_is_refused(tmp_path: Path) -> None:
         study.system()
 
 
-def test_a_checkpoint_knows_its_mesh_and_its_pages(tmp_path: Path) -> None:
-    """As many unknowns are not enough: other places, other elements, another page."""
-    file = tmp_path / "rod.npz"
-    list(rod(4).march(dt=0.1, until=0.1, checkpoint=file))
-    moved = Study(Mesh.line(2.0, cells=4))
-    moved.add("rod", heat(), k=1.0)
-    with pytest.raises(StudyError, match="another study: other nodes or cells"):
-        moved.march(dt=0.1, until=1.0, restart=file)
-    other = Study(Mesh.line(1.0, cells=4))
-    other.add("bar", maxwell(), E=1.0, tau=1.0)
-    with pytest.raises(StudyError, match="another study: other pages or elements"):
-        other.march(dt=0.1, until=1.0, restart=file)
-    harder = rod(4)
-    harder.load((0.5,), u=1.0)
-    (step,) = harder.march(dt=0.1, until=0.2, restart=file)  # loads may change
-    assert step.t == pytest.approx(0.2)
-
-
 def test_a_checkpoint_that_was_edited_is_refused(tmp_path: Path) -> None:
     """Temperatures, a time, a name: whatever a restart believes."""
     file = tmp_path / "rod.npz"
