@@ -77,11 +77,11 @@ def measured(order: int, unknowns: float, threads: int, memory: float) -> str:
     product, v, found = prepared(order, unknowns, threads)
     clock = time.thread_time if threads == 1 else time.perf_counter
     seconds = least(lambda: product(v, found), clock)
-    size = product.places.unknowns.size
-    small, w, other = prepared(order, IN_CACHE / product.kept.nbytes * size, 1)
-    cached = small.places.unknowns.size / least(lambda: small(w, other)) / 1e6
-    rate, kept = size / seconds / 1e6, product.kept.nbytes / size
-    moved = (product.kept.nbytes + product.places.index.nbytes) / size + 3 * v.itemsize
+    size = product.numbering.unknowns.size
+    small, w, other = prepared(order, IN_CACHE / product.cached.nbytes * size, 1)
+    cached = small.numbering.unknowns.size / least(lambda: small(w, other)) / 1e6
+    rate, kept = size / seconds / 1e6, product.cached.nbytes / size
+    moved = (product.cached.nbytes + product.numbering.index.nbytes) / size + 3 * v.itemsize
     roof = min(1e3 * memory / moved, cached) * threads
     return (
         f"{order:5} {size:9} {1e3 * seconds:9.2f} {rate:8.1f} {kept:8.0f} "

@@ -253,14 +253,14 @@ class Body:
         diagonal = free.gather(self.M.diagonal())
         inverse = 1.0 / np.where(diagonal > 0.0, diagonal, np.inf)
         solution = conjugate_gradients(
-            lambda z: free.gather(self.M @ free.spread(z)),
+            lambda z: free.gather(self.M @ free.expand(z)),
             lambda r: inverse * r,
             np.where(diagonal > 0.0, -free.gather(forces.total + forces.constraints), 0.0),
             *(_EXACT, _MOST, self.comm.dot),
         )
         if not solution.converged:
             raise StudyError("the mass is not positive: no accelerations at the start are found")
-        return free.spread(solution.x)
+        return free.expand(solution.x)
 
     def masked(self, values: Affine) -> Affine:
         """Zero in unknowns without mass, for their velocities and accelerations."""

@@ -106,7 +106,7 @@ class ExplicitMarch:
 
     def _accelerations(self, forces: Array) -> Array:
         """Accelerations (n,) of free unknowns; tied ones move as one."""
-        return self.free.spread(-self.free.gather(forces) / self.masses)
+        return self.free.expand(-self.free.gather(forces) / self.masses)
 
     def _stable(self, problem: Problem) -> float:
         """2 over the highest frequency about the present state."""
@@ -114,7 +114,7 @@ class ExplicitMarch:
         free, root, comm = self.free, 1.0 / np.sqrt(self.masses), self.body.comm
 
         def scaled(z: Array) -> Array:
-            forces: Array = K @ free.spread(root * z)
+            forces: Array = K @ free.expand(root * z)
             return root * free.gather(forces)
 
         begin = np.random.default_rng(comm.rank_and_size[0]).uniform(-1.0, 1.0, len(root))

@@ -29,14 +29,14 @@ class Triangles:
     corners: Array
 
 
-def common_part(one: Cell, mine: Array, other: Cell, theirs: Array) -> Triangles:
+def common_part(one: Cell, one_corners: Array, other: Cell, other_corners: Array) -> Triangles:
     """Overlap of pairs of opposite faces with corners (n, a, 3) and (n, b, 3)."""
     a, b = one.corners, other.corners
-    plane = _plane(one, mine[:, :a])
-    S, M = (np.einsum("nkc,ncd->nkd", x, plane) for x in (mine[:, :a], theirs[:, :b]))
+    plane = _plane(one, one_corners[:, :a])
+    S, M = (np.einsum("nkc,ncd->nkd", x, plane) for x in (one_corners[:, :a], other_corners[:, :b]))
     inside, within = _inside(S, M[:, ::-1]), _inside(M, S)
     alpha, beta, crosses = _crossings(S, M)
-    n = len(mine)
+    n = len(one_corners)
     motion = np.zeros((n, a + b + a * b, CORNER))
     motion[:, :a, :2], motion[:, :a, 6:8] = one.nodes[:a], other.nodes[:b].mean(axis=0)
     motion[:, :a, [8, 11]] = 1.0
@@ -56,11 +56,11 @@ def common_part(one: Cell, mine: Array, other: Cell, theirs: Array) -> Triangles
     return _fan(points, valid, motion)
 
 
-def parents(cell: Cell, corners: Array, places: Array) -> Array:
+def parents(cell: Cell, corners: Array, queries: Array) -> Array:
     """Parent coordinates (n, m, 2) in faces with flat corners (n, k, 2) of places (n, m, 2)."""
-    n, m = places.shape[:2]
+    n, m = queries.shape[:2]
     xi = np.tile(cell.nodes[: cell.corners].mean(axis=0), (n * m, 1))
-    x, target = np.repeat(corners, m, axis=0), places.reshape(n * m, 2)
+    x, target = np.repeat(corners, m, axis=0), queries.reshape(n * m, 2)
     flat = _linear(cell)
     with np.errstate(all="ignore"):
         for _ in range(1 if cell.corners == 3 else _ITERATIONS):
@@ -136,7 +136,7 @@ def _once(points: Array, valid: Flags, S: Array) -> Flags:
     return np.asarray(valid & (away | ~earlier).all(axis=2))
 
 
-def _fan(points: Array, valid: Flags, told: Array) -> Triangles:
+def _fan(points: Array, valid: Flags, motion: Array) -> Triangles:
     """Triangles of the convex hull of the valid points of each pair."""
     count = valid.sum(axis=1)
     mean = (points * valid[:, :, None]).sum(axis=1) / np.maximum(count, 1)[:, None]
@@ -148,7 +148,7 @@ def _fan(points: Array, valid: Flags, told: Array) -> Triangles:
         pair = np.flatnonzero(count > k + 1)
         triangle = order[pair][:, [0, k, k + 1]]
         pairs.append(pair)
-        corners.append(told[pair[:, None], triangle])
+        corners.append(motion[pair[:, None], triangle])
     pair_numbers = np.concatenate([np.empty(0, np.int64), *pairs])
     sort = np.argsort(pair_numbers, kind="stable")
     return Triangles(pair_numbers[sort], np.concatenate([np.empty((0, 3, CORNER)), *corners])[sort])

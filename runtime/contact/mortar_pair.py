@@ -50,21 +50,21 @@ class MortarPairKernel:
         """Of the law."""
         return self.law.signature
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Element residuals (n, ndof)."""
-        return self.tangent(coordinates, dofs, **given)[0]
+        return self.tangent(coordinates, dofs, **kwargs)[0]
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
         """Element residuals (n, ndof) and tangents (n, ndof, ndof)."""
         n, ndof = dofs.shape
         R, K = np.zeros((n, ndof)), np.zeros((n, ndof, ndof))
         if n:
-            at = _PairGeometry.of(self, coordinates, dofs, given["data"])
+            at = _PairGeometry.of(self, coordinates, dofs, kwargs["data"])
             for weight, point in at.points():
                 self._add(R, K, at, weight, point)
         return R, K
 
-    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def fields_at(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """None, (n, 0, 0): fields are those of the whole face."""
         return np.empty((len(dofs), 0, 0))
 
@@ -331,10 +331,10 @@ def _triple(a: _Varied, b: _Varied, c: _Varied) -> _Varied:
     return np.einsum("nc,nc->n", np.cross(a[0], b[0]), c[0]), sum(changes)
 
 
-def _tangential_solution(K: Array, off: _Varied, normal: _Varied) -> _Varied:
+def _tangential_solution(K: Array, offset: _Varied, normal: _Varied) -> _Varied:
     """v with K v + g n = off, and its derivatives where v is nearly zero."""
-    w = _solve_columns(K, normal[0], off[0])
-    change = off[1] - w[:, 2, None, None] * normal[1]
+    w = _solve_columns(K, normal[0], offset[0])
+    change = offset[1] - w[:, 2, None, None] * normal[1]
     return w[:, :2], _solve_columns(K, normal[0], change)[:, :2]
 
 

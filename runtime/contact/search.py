@@ -117,10 +117,10 @@ class Contact:
         )
 
 
-def pairs_within(tree: cKDTree, places: Array, radius: Array) -> tuple[Integers, Integers]:
+def pairs_within(tree: cKDTree, queries: Array, radius: Array) -> tuple[Integers, Integers]:
     """Pairs of places (n, dim) and points of a tree that are no further apart than radius, (n,)."""
-    neighbours = tree.query_ball_point(places, radius, return_sorted=True)
-    one = np.repeat(np.arange(len(places)), [len(row) for row in neighbours])
+    neighbours = tree.query_ball_point(queries, radius, return_sorted=True)
+    one = np.repeat(np.arange(len(queries)), [len(row) for row in neighbours])
     return one, np.concatenate([np.empty(0, dtype=np.int64), *neighbours]).astype(np.int64)
 
 
@@ -128,9 +128,11 @@ Balls: TypeAlias = tuple[Array, Array, Array]
 """Centres (n, dim), radii (n,) of faces, and directions (n, dim) that are opposite in contact."""
 
 
-def facing(mine: Balls, theirs: Balls, limits: tuple[Array, Array]) -> tuple[Integers, Integers]:
+def facing(
+    one_side: Balls, other_side: Balls, limits: tuple[Array, Array]
+) -> tuple[Integers, Integers]:
     """Pairs of opposite faces that are near enough to come into contact."""
-    (centre, radius, along), (far, size, against), (depth, reach) = mine, theirs, limits
+    (centre, radius, along), (far, size, against), (depth, reach) = one_side, other_side, limits
     tree = cKDTree(far)
     nearest = SLANTED * tree.query(centre)[0]
     one, other = pairs_within(
@@ -141,13 +143,13 @@ def facing(mine: Balls, theirs: Balls, limits: tuple[Array, Array]) -> tuple[Int
 
 
 def without_common_corners(
-    mine: Integers, theirs: Integers, one: Integers, other: Integers, *, alone: bool
+    one_side: Integers, other_side: Integers, one: Integers, other: Integers, *, alone: bool
 ) -> tuple[Integers, Integers]:
     """Pairs of faces without a corner in common; alone: both are one surface, each pair once.
 
     mine, theirs: corners (n, k) of all faces. one, other: rows of them, (m,).
     """
-    mask = (mine[one][:, :, None] != theirs[other][:, None, :]).all(axis=(1, 2))
+    mask = (one_side[one][:, :, None] != other_side[other][:, None, :]).all(axis=(1, 2))
     if alone:
         mask &= one < other
     return one[mask], other[mask]
@@ -187,11 +189,11 @@ def _starts(parts: Sequence[Integers]) -> Integers:
     return np.cumsum([0, *map(len, parts)])[:-1]
 
 
-def _balls(ends: Array) -> Balls:
+def _balls(end_points: Array) -> Balls:
     """Centres (n, 2), radii (n,) and unit directions (n, 2) of segments with ends (n, 2, 2)."""
-    along = ends[:, 1] - ends[:, 0]
+    along = end_points[:, 1] - end_points[:, 0]
     length = np.linalg.norm(along, axis=1)
-    return ends.mean(axis=1), 0.5 * length, along / np.maximum(length, 1e-300)[:, None]
+    return end_points.mean(axis=1), 0.5 * length, along / np.maximum(length, 1e-300)[:, None]
 
 
 def nodes_of(sides: Sequence[ContactSide], others: Sequence[tuple[str, Integers]]) -> Integers:
@@ -287,9 +289,9 @@ class ContactProblem(Problem):
             limit = min(limit, max_step(contact.sides) / max(largest, 1e-300))
         return limit
 
-    def after(self, before: Array, x: Array) -> ContactProblem:
+    def after(self, previous: Array, x: Array) -> ContactProblem:
         """The problem as it is after a step from `before` to x, (n,)."""
-        return replace(self, change=x - before)
+        return replace(self, change=x - previous)
 
     def where_not_finite(self, x: Array) -> str:
         """See `Problem`."""

@@ -68,20 +68,22 @@ class FaceContact:
             result.append(self._block(a, b, (i[part.pairs], j[part.pairs], part.corners), old))
         return result
 
-    def _pairs(self, places: Array) -> tuple[Integers, Integers]:
+    def _pairs(self, node_points: Array) -> tuple[Integers, Integers]:
         """Numbers of sides and of others, both counted through their kinds, that may meet."""
         sides = [(s.kind, s.faces) for s in self.sides]
-        side, other = facing(_balls(places, sides), _balls(places, self.others), limits(self.sides))
+        side, other = facing(
+            _balls(node_points, sides), _balls(node_points, self.others), limits(self.sides)
+        )
         return without_common_corners(
             _corners(sides), _corners(self.others), side, other, alone=self.alone
         )
 
     def _block(
-        self, a: int, b: int, found: tuple[Integers, Integers, Array], old: Array
+        self, a: int, b: int, overlaps: tuple[Integers, Integers, Array], old: Array
     ) -> ElementBlock:
         """Elements of triangles of sides of kind a and others of kind b."""
         side, (kind, faces) = self.sides[a], self.others[b]
-        one, other, corners = found
+        one, other, corners = overlaps
         side_faces = side.faces[one]
         nodes = np.concatenate([side_faces, faces[other]], axis=1)
         n, width = len(nodes), 3 * nodes.shape[1]
@@ -104,11 +106,11 @@ class FaceContact:
         )
 
 
-def _balls(places: Array, kinds: Sequence[tuple[str, Integers]]) -> Balls:
+def _balls(node_points: Array, kinds: Sequence[tuple[str, Integers]]) -> Balls:
     """Centres, radii and normals of the faces of all kinds."""
     balls = []
     for kind, faces in kinds:
-        corners = places[faces[:, : CELLS[kind].corners]]
+        corners = node_points[faces[:, : CELLS[kind].corners]]
         centre = corners.mean(axis=1)
         radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
         balls.append((centre, radius, mean_normal(CELLS[kind], corners)))

@@ -28,7 +28,7 @@ class ConstraintMap(Protocol):
         """T' f of forces of the elements of this process: own sums over all."""
         ...
 
-    def spread(self, z: Array) -> Array:
+    def expand(self, z: Array) -> Array:
         """T z at the unknowns of this process."""
         ...
 
@@ -85,10 +85,10 @@ class Communicator:
         """Free unknowns of the equations of this process."""
         return Constraints.of(problem)
 
-    def local_problem(self, posed: Any) -> Problem:
+    def local_problem(self, distributed: Any) -> Problem:
         """Equations of this process of a distributed problem."""
-        found: Problem = posed
-        return found
+        problem: Problem = distributed
+        return problem
 
     def lowest_modes(
         self, problem: Problem, K: csc_array, M: csc_array, count: int

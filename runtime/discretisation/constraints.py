@@ -64,7 +64,7 @@ class Constraints:
         T = csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, int((~constrained).sum())))
         if inner:
             assert K is not None
-            moved = [-_spread(inverse, numbers, n) @ K @ T for numbers, inverse in inner]
+            moved = [-_block_matrix(inverse, numbers, n) @ K @ T for numbers, inverse in inner]
             T = csr_array(T + sum(moved))
         return cls(problem, T)
 
@@ -72,7 +72,7 @@ class Constraints:
         """T' f, (m,)."""
         return np.asarray(self.map.T @ forces)
 
-    def spread(self, z: Array) -> Array:
+    def expand(self, z: Array) -> Array:
         """T z, (n,)."""
         return np.asarray(self.map @ z)
 
@@ -118,7 +118,7 @@ def _inverses(blocks: Array) -> Array:
         return np.full_like(blocks, np.nan)
 
 
-def _spread(blocks: Array, numbers: Integers, n: int) -> csr_array:
+def _block_matrix(blocks: Array, numbers: Integers, n: int) -> csr_array:
     """A matrix (n, n) of blocks (., k, k) at numbers (., k)."""
     k = numbers.shape[1]
     rows, columns = np.repeat(numbers, k, axis=1).ravel(), np.tile(numbers, k).ravel()
@@ -135,7 +135,7 @@ def _condensed(problem: Problem, K: csc_array) -> csc_array:
     """K (n, n) with internal unknowns of elements condensed, whose rows and columns are zero."""
     mask, n = np.ones(problem.assembler.size), problem.assembler.size
     for numbers, inverse in _internal(problem, K):
-        K = csc_array(K - K @ _spread(inverse, numbers, n) @ K)
+        K = csc_array(K - K @ _block_matrix(inverse, numbers, n) @ K)
         mask[numbers] = 0.0
     return K if mask.all() else csc_array(K.multiply(mask[:, None]).multiply(mask[None]))
 
@@ -231,7 +231,7 @@ class LevelConstraints:
     slaves: Integers
     masters: Integers
 
-    def spread(self, x: Array) -> None:
+    def expand(self, x: Array) -> None:
         """T x in place: those behind take the value of those ahead."""
         x[self.slaves] = x[self.masters]
 

@@ -46,48 +46,48 @@ class DiscreteGradientKernel:
             raise AttributeError(name)
         return getattr(self.kernel, name)
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Mean of the residuals (n, ndof)."""
         forces = np.zeros(dofs.shape)
-        for _, weight, at, values in self._points(dofs, given):
+        for _, weight, at, values in self._points(dofs, kwargs):
             forces += weight * self.kernel.residual(coordinates, at, **values)
         if (columns := self.multipliers).size:
-            end = self.kernel.residual(coordinates, dofs, **self._end(dofs, given))
+            end = self.kernel.residual(coordinates, dofs, **self._end(dofs, kwargs))
             forces[:, columns] = end[:, columns]
         return forces
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
         """Means of residuals and of their derivatives by the unknowns at the end."""
         forces, tangents = np.zeros(dofs.shape), np.zeros((*dofs.shape, dofs.shape[1]))
-        for s, weight, at, values in self._points(dofs, given):
+        for s, weight, at, values in self._points(dofs, kwargs):
             r, K = self.kernel.tangent(coordinates, at, **values)
             forces += weight * r
             moving = np.full(dofs.shape[1], weight * s)
             moving[self.multipliers] = weight
             tangents += moving * K
         if (columns := self.multipliers).size:
-            r, K = self.kernel.tangent(coordinates, dofs, **self._end(dofs, given))
+            r, K = self.kernel.tangent(coordinates, dofs, **self._end(dofs, kwargs))
             forces[:, columns], tangents[:, columns] = r[:, columns], K[:, columns]
         return forces, tangents
 
-    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def fields_at(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """None, (n, 0, 0): fields belong to states."""
         return np.empty((len(dofs), 0, 0))
 
-    def _end(self, dofs: Array, given: dict[str, Any]) -> dict[str, Any]:
+    def _end(self, dofs: Array, kwargs: dict[str, Any]) -> dict[str, Any]:
         """Arguments at the end of the step."""
-        kernel_data = given["data"][:, : -dofs.shape[1]]
+        kernel_data = kwargs["data"][:, : -dofs.shape[1]]
         return {
-            **given,
+            **kwargs,
             "data": np.ascontiguousarray(kernel_data) if kernel_data.shape[1] else None,
         }
 
-    def _points(self, dofs: Array, given: dict[str, Any]) -> Any:
+    def _points(self, dofs: Array, kwargs: dict[str, Any]) -> Any:
         """Place along the step, weight, unknowns and other arguments at each point."""
-        kernel_data, old = np.split(given["data"], [-dofs.shape[1]], axis=1)
+        kernel_data, old = np.split(kwargs["data"], [-dofs.shape[1]], axis=1)
         for xi, weight in zip(*roots_legendre(POINTS), strict=True):
             s = 0.5 * (1.0 + xi)
-            data, parameters = kernel_data.copy(), given["parameters"].copy()
+            data, parameters = kernel_data.copy(), kwargs["parameters"].copy()
             for number, columns, unknowns in self.timed:
                 # (c / s) u(s) + r' is c u + r for every s
                 data[:, columns] -= parameters[number] * (1.0 / s - 1.0) * old[:, unknowns]
@@ -97,7 +97,7 @@ class DiscreteGradientKernel:
             data_or_none = data if data.shape[1] else None
             at = np.ascontiguousarray(old + s * (dofs - old))
             at[:, self.multipliers] = dofs[:, self.multipliers]
-            yield s, 0.5 * weight, at, {**given, "data": data_or_none, "parameters": parameters}
+            yield s, 0.5 * weight, at, {**kwargs, "data": data_or_none, "parameters": parameters}
 
 
 def with_old(block: ElementBlock, old: Array) -> ElementBlock:

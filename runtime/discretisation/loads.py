@@ -20,17 +20,19 @@ _HIGHER = 2
 """Loads are functions of any kind. On linear faces cubic ones are integrated exactly."""
 
 
-def amount(value: Amount, places: Array, t: float, factor: float) -> Array:
+def amount(value: Amount, positions: Array, t: float, factor: float) -> Array:
     """Values (n,) at places (n, dim): factor times a number, or a function of places and t.
 
     Raises ValueError for another shape.
     """
     if not callable(value):
-        return np.full(len(places), factor * float(value))
-    result = np.asarray(value(places, t), dtype=np.float64)
-    if result.shape not in ((), (len(places),)):
-        raise ValueError(f"a function of {len(places)} places gave values of shape {result.shape}")
-    return np.broadcast_to(result, (len(places),)).copy()
+        return np.full(len(positions), factor * float(value))
+    result = np.asarray(value(positions, t), dtype=np.float64)
+    if result.shape not in ((), (len(positions),)):
+        raise ValueError(
+            f"a function of {len(positions)} places gave values of shape {result.shape}"
+        )
+    return np.broadcast_to(result, (len(positions),)).copy()
 
 
 def _rule(face: Cell, *, ring: bool) -> tuple[Array, Array]:
@@ -49,7 +51,7 @@ class _Kernel:
     parameters: tuple[str, ...] = ()
     fields: tuple[str, ...] = ()
 
-    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def fields_at(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """None, (n, 0, 0)."""
         return np.empty((len(dofs), 0, 0))
 
@@ -68,14 +70,14 @@ class DeadLoad(_Kernel):
     name = "dead load"
     parameters = _TIME
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Minus the virtual work of the load, (n, k)."""
         n, nodes = len(coordinates), len(self.face.nodes)
         node_points = coordinates.reshape(n, nodes, coordinates.shape[1] // nodes)
         points, weights = _rule(self.face, ring=self.ring)
         shape = self.face.shape(points)
         x = np.einsum("qk,nkc->nqc", shape, node_points)
-        load = amount(self.value, x.reshape(-1, x.shape[2]), *given["parameters"].tolist())
+        load = amount(self.value, x.reshape(-1, x.shape[2]), *kwargs["parameters"].tolist())
         area = (
             measures(self.face, node_points, points)
             if self.face.dimension
@@ -85,9 +87,9 @@ class DeadLoad(_Kernel):
         work = np.einsum("nq,nq,q,qk->nk", load.reshape(x.shape[:2]), area, weights, shape)
         return np.asarray(-work)
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
         """Residual, and a tangent of zeros."""
-        r = self.residual(coordinates, dofs, **given)
+        r = self.residual(coordinates, dofs, **kwargs)
         return r, np.zeros((*r.shape, r.shape[1]))
 
 
@@ -106,13 +108,13 @@ class Pressure(_Kernel):
     name = "pressure"
     parameters = _TIME
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Minus the virtual work of the pressure, (n, k)."""
-        return self._evaluate(coordinates, dofs, given)[0]
+        return self._evaluate(coordinates, dofs, kwargs)[0]
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
         """Residual and its exact tangent, which is not symmetric."""
-        r, gradient, load, points = self._evaluate(coordinates, dofs, given)
+        r, gradient, load, points = self._evaluate(coordinates, dofs, kwargs)
         around = self._around(coordinates, dofs, points)
         shape, along = self.face.shape(points), self.face.gradient(points)
         turn = _turned(
@@ -125,7 +127,7 @@ class Pressure(_Kernel):
         return r, np.ascontiguousarray(K.reshape(*r.shape, r.shape[1]))
 
     def _evaluate(
-        self, coordinates: Array, dofs: Array, given: Any
+        self, coordinates: Array, dofs: Array, kwargs: Any
     ) -> tuple[Array, Array, Array, Array]:
         """Residual (n, k c), slopes of the deformed face (n, q, c, d), load times weight (n, q)
         and the points.
@@ -137,7 +139,7 @@ class Pressure(_Kernel):
         values, along = self.face.shape(points), self.face.gradient(points)
         load_points = np.einsum("qk,nkc->nqc", values, X)
         load = amount(
-            self.value, load_points.reshape(-1, X.shape[2]), *given["parameters"].tolist()
+            self.value, load_points.reshape(-1, X.shape[2]), *kwargs["parameters"].tolist()
         )
         gradient = np.einsum("qkd,nkc->nqcd", along, X + u)
         weighted = load.reshape(load_points.shape[:2]) * weights
@@ -154,23 +156,23 @@ class Pressure(_Kernel):
         return np.asarray(2.0 * np.pi * radius @ self.face.shape(points).T)
 
 
-def _normal(slopes: Array) -> Array:
+def _normal(gradient: Array) -> Array:
     """Outward normals (n, q, c) times length or area per parent unit, from slopes (n, q, c, d)."""
-    if slopes.shape[2] == 2:
-        return np.stack([slopes[..., 1, 0], -slopes[..., 0, 0]], axis=-1)
-    return np.asarray(np.cross(slopes[..., 0], slopes[..., 1]))
+    if gradient.shape[2] == 2:
+        return np.stack([gradient[..., 1, 0], -gradient[..., 0, 0]], axis=-1)
+    return np.asarray(np.cross(gradient[..., 0], gradient[..., 1]))
 
 
-def _turned(slopes: Array) -> Array:
+def _turned(gradient: Array) -> Array:
     """Derivatives of the normal by the slopes, (n, q, c, c, d)."""
-    derivatives = np.zeros((*slopes.shape[:2], slopes.shape[2], *slopes.shape[2:]))
-    if slopes.shape[2] == 2:
+    derivatives = np.zeros((*gradient.shape[:2], gradient.shape[2], *gradient.shape[2:]))
+    if gradient.shape[2] == 2:
         derivatives[..., 0, 1, 0], derivatives[..., 1, 0, 0] = 1.0, -1.0
         return derivatives
     for c in range(3):  # normal = a x b, d/da_c = e_c x b, d/db_c = a x e_c
         e = np.eye(3)[c]
-        derivatives[..., :, c, 0] = np.cross(e, slopes[..., 1])
-        derivatives[..., :, c, 1] = np.cross(slopes[..., 0], e)
+        derivatives[..., :, c, 0] = np.cross(e, gradient[..., 1])
+        derivatives[..., :, c, 1] = np.cross(gradient[..., 0], e)
     return derivatives
 
 
@@ -182,13 +184,13 @@ class NodalForce(_Kernel):
     name = "nodal force"
     parameters = _TIME
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Minus the forces, (n, 1)."""
-        return -amount(self.value, coordinates, *given["parameters"].tolist())[:, None]
+        return -amount(self.value, coordinates, *kwargs["parameters"].tolist())[:, None]
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
         """Residual, and a tangent of zeros."""
-        r = self.residual(coordinates, dofs, **given)
+        r = self.residual(coordinates, dofs, **kwargs)
         return r, np.zeros((*r.shape, 1))
 
 
@@ -199,11 +201,11 @@ class Spring(_Kernel):
     stiffness: float
     name = "spring"
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Forces, (n, 1)."""
         return self.stiffness * dofs
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
         """Forces and stiffness."""
         return self.residual(coordinates, dofs), np.full((len(dofs), 1, 1), self.stiffness)
 
@@ -219,13 +221,13 @@ class Tie(_Kernel):
     name = "tie"
     parameters = _TIME
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Forces of the multiplier and the equation itself, (n, 3)."""
         a, b, force = dofs.T
-        offset = amount(self.offset, coordinates, *given["parameters"].tolist())
+        offset = amount(self.offset, coordinates, *kwargs["parameters"].tolist())
         return np.stack([force, -force, a - b - offset], axis=1)
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
         """Residual and its constant tangent."""
         K = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, -1.0, 0.0]])
-        return self.residual(coordinates, dofs, **given), np.tile(K, (len(dofs), 1, 1))
+        return self.residual(coordinates, dofs, **kwargs), np.tile(K, (len(dofs), 1, 1))

@@ -19,7 +19,7 @@ _AT_ONCE = 1_000_000
 
 
 def mass_matrices(
-    cell: Cell, places: Array, density: Array, *, ring: bool, geometry: Cell | None = None
+    cell: Cell, node_points: Array, density: Array, *, ring: bool, geometry: Cell | None = None
 ) -> Array:
     """Integrals (n, k, k) of density N_a N_b over cells, exact on bent ones, too.
 
@@ -30,15 +30,15 @@ def mass_matrices(
     outline = geometry or cell
     points, weights = outline.measured_rule(2 * cell.order, ring=ring)
     shape, position = cell.shape(points), outline.shape(points)
-    matrices = np.empty((len(places), shape.shape[1], shape.shape[1]))
+    matrices = np.empty((len(node_points), shape.shape[1], shape.shape[1]))
     step = max(_AT_ONCE // shape.size, 1)
-    for first in range(0, len(places), step):
+    for first in range(0, len(node_points), step):
         some = slice(first, first + step)
         mass = density[some, None] * weights
         if outline.dimension:
-            mass = mass * measures(outline, places[some], points)
+            mass = mass * measures(outline, node_points[some], points)
         if ring:
-            mass = mass * 2.0 * np.pi * (places[some, :, 1] @ position.T)
+            mass = mass * 2.0 * np.pi * (node_points[some, :, 1] @ position.T)
         matrices[some] = (mass[:, None, :] * shape.T) @ shape
     return matrices
 
@@ -83,23 +83,23 @@ class MassKernel:
         """Of some of the elements."""
         return MassKernel(self.matrices[rows], self.components)
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Virtual work of inertia, (n, components k)."""
-        a = float(given["parameters"][0]) * dofs
-        if given.get("data") is not None:
-            a = a + given["data"]
+        a = float(kwargs["parameters"][0]) * dofs
+        if kwargs.get("data") is not None:
+            a = a + kwargs["data"]
         n, k = self.matrices.shape[:2]
         rows = np.einsum("nab,ncb->nca", self.matrices, a.reshape(n, self.components, k))
         return np.asarray(rows.reshape(dofs.shape))
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
         """Residual, and c m."""
         n, k = self.matrices.shape[:2]
         K = np.zeros((n, self.components, k, self.components, k))
         for c in range(self.components):
-            K[:, c, :, c, :] = float(given["parameters"][0]) * self.matrices
-        return self.residual(coordinates, dofs, **given), K.reshape(*dofs.shape, dofs.shape[1])
+            K[:, c, :, c, :] = float(kwargs["parameters"][0]) * self.matrices
+        return self.residual(coordinates, dofs, **kwargs), K.reshape(*dofs.shape, dofs.shape[1])
 
-    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def fields_at(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """None, (n, 0, 0)."""
         return np.empty((len(dofs), 0, 0))

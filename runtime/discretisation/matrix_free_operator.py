@@ -45,11 +45,11 @@ class MatrixFreeOperator:
     levels: MultigridLevels
     iteration: KrylovSettings
     products: tuple[ElementProduct, ...]
-    rest: csr_array
+    loads_matrix: csr_array
     diagonals: Array
     ties: Ties
     lower: csr_array
-    held: Integers
+    constrained: Integers
     work: tuple[Array, Array]
 
     @classmethod
@@ -92,11 +92,11 @@ class MatrixFreeOperator:
             levels=levels,
             iteration=iteration,
             products=tuple(products),
-            rest=csr_array(loads_matrix),
+            loads_matrix=csr_array(loads_matrix),
             diagonals=diagonal,
             ties=ties,
             lower=csr_array(T.T @ lower @ T),
-            held=constrained,
+            constrained=constrained,
             work=work,
         )
 
@@ -120,8 +120,8 @@ class MatrixFreeOperator:
         target.fill(0.0)
         for product in self.products:
             product(source, target)
-        if self.rest.nnz:
-            target[:n] += self.rest @ source[:n]
+        if self.loads_matrix.nnz:
+            target[:n] += self.loads_matrix @ source[:n]
         return target[:n]
 
     def apply(self, v: Array) -> Array:
@@ -129,11 +129,11 @@ class MatrixFreeOperator:
         source, target = self.work
         x, follow = source[: len(v)], self.ties.follows[0]
         x[:] = v
-        x[self.held] = 0.0
-        follow.spread(x)
+        x[self.constrained] = 0.0
+        follow.expand(x)
         y = self._product(source, target).copy()
         follow.gather(y)
-        y[self.held] = v[self.held]
+        y[self.constrained] = v[self.constrained]
         return y
 
     def __matmul__(self, v: Array) -> Array:
@@ -162,9 +162,9 @@ class MatrixFreeOperator:
         x = ties.shift(r)
         b = (r - self._untied(x) if tied else r)[order]
         follow.gather(b)
-        b[self.held] = 0.0
+        b[self.constrained] = 0.0
         z = self._iterated(b)
-        follow.spread(z)
+        follow.expand(z)
         x[order] += z
         if tied:
             ties.put_forces(x, r - self._untied(x))
@@ -198,7 +198,7 @@ class MatrixFreeOperator:
         if not np.isfinite(diagonal).all():
             raise SingularMatrix("the tangent has entries that are not finite")
         follows[0].gather(diagonal)
-        diagonal[self.held] = 1.0
+        diagonal[self.constrained] = 1.0
         multigrid_levels, matrix = list[MultigridLevel](), self.lower
         for step, (upper, lower) in zip(levels.steps, pairwise(follows), strict=True):
             P = without(step, upper.moving) @ lower.matrix
@@ -209,8 +209,8 @@ class MatrixFreeOperator:
             multigrid_levels.append(MultigridLevel.of(A.__matmul__, A.diagonal(), P))
             matrix = csr_array(P.T @ matrix @ P)
         moving = follows[-1].moving
-        near = np.where(moving[:, None], levels.nullspace, 0.0)
-        lowest = coarse_solver(_with_ones(matrix, moving), near, levels.components)
+        masked_nullspace = np.where(moving[:, None], levels.nullspace, 0.0)
+        lowest = coarse_solver(_with_ones(matrix, moving), masked_nullspace, levels.components)
         return MultigridCycle(multigrid_levels, lowest)
 
 

@@ -74,7 +74,7 @@ class ElementNumbering:
     at: Integers
     size: int
     runs: tuple[tuple[int, int], ...]
-    rest: tuple[int, int]
+    shared_run: tuple[int, int]
 
     @classmethod
     def of(
@@ -163,38 +163,38 @@ class ElementProduct:
     kept: (m, points, numbers) in the order of the C function.
     """
 
-    places: ElementNumbering
+    numbering: ElementNumbering
     action: Action
-    kept: Array
+    cached: Array
     parameters: Array
     _pool: ThreadPoolExecutor | None = field(init=False)
 
     @classmethod
     def of(
-        cls, block: ElementBlock, x: Array, parameters: Array, places: ElementNumbering
+        cls, block: ElementBlock, x: Array, parameters: Array, numbering: ElementNumbering
     ) -> ElementProduct:
         """At the vector x of the whole system."""
         kernel = require_product(block)
-        points, m = len(kernel.default_rule.weights), len(places.order)
+        points, m = len(kernel.default_rule.weights), len(numbering.order)
         keep = kernel.library.function(kernel.name, "keep")
         cached = _aligned(m, points * kernel.kept)
         nothing = np.empty(0)
         for first in range(0, m, GROUP * _CHUNK):
             part = slice(first, min(first + GROUP * _CHUNK, m))
-            some = places.order[part]
+            some = numbering.order[part]
             data = _data(block, some)
             read = (block.coordinates[some], x[block.dofs[some]], data)
             arrays = (*read, parameters, nothing, nothing, nothing)
             keep((len(some), points, 0), arrays, cached[part], None)
-        return cls(places, kernel.library.action(kernel.name), cached, parameters)
+        return cls(numbering, kernel.library.action(kernel.name), cached, parameters)
 
     def __post_init__(self) -> None:
-        several = len(self.places.runs) > 1
-        self._pool = ThreadPoolExecutor(len(self.places.runs)) if several else None
+        several = len(self.numbering.runs) > 1
+        self._pool = ThreadPoolExecutor(len(self.numbering.runs)) if several else None
 
     def __call__(self, x: Array, y: Array) -> None:
         """y += K x for vectors as `ElementNumbering.vector` makes them."""
-        parameters, cached, index = self.parameters, self.kept, self.places.index
+        parameters, cached, index = self.parameters, self.cached, self.numbering.index
 
         def run(span: tuple[int, int]) -> None:
             first, last = span
@@ -202,14 +202,14 @@ class ElementProduct:
                 self.action(span, parameters, cached, index, x, y)
 
         if self._pool is None:
-            run((0, len(self.places.order)))
+            run((0, len(self.numbering.order)))
         else:
-            list(self._pool.map(run, self.places.runs))
-            run(self.places.rest)
+            list(self._pool.map(run, self.numbering.runs))
+            run(self.numbering.shared_run)
 
     def add(self, x: Array, y: Array) -> None:
         """y += K x for vectors of the whole system."""
-        places, source, target = self.places, self.places.vector(), self.places.vector()
+        places, source, target = self.numbering, self.numbering.vector(), self.numbering.vector()
         source[places.at] = x[places.unknowns]
         self(source, target)
         y[places.unknowns] += target[places.at]

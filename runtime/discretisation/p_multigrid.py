@@ -134,7 +134,11 @@ class MultigridLevels:
             inverse = _inverse(level_unknowns, size)
             dofs.append({n: inverse[d.reshape(len(d), -1)] for n, d in lower_dofs.items()})
             pairs = [
-                (dofs[-2][b.name], dofs[-1][b.name], _element(b, upper, now, whole=len(steps) == 0))
+                (
+                    dofs[-2][b.name],
+                    dofs[-1][b.name],
+                    _element(b, upper, now, kernel_order=len(steps) == 0),
+                )
                 for b in pages
             ]
             steps.append(interpolation(pairs, len(unknowns[-1]), len(level_unknowns)))
@@ -161,9 +165,9 @@ def _inverse(numbers: Integers, size: int) -> Integers:
     return positions
 
 
-def _element(block: ElementBlock, upper: int, lower: int, *, whole: bool) -> Array:
+def _element(block: ElementBlock, upper: int, lower: int, *, kernel_order: bool) -> Array:
     """Interpolation of an element; whole: to its unknowns in the order of the kernel."""
-    if whole:
+    if kernel_order:
         return OrderTransfer.of(block, lower).matrix()
     kernel = require_product(block)
     cell, components = CELLS[kernel.cell], len(kernel.unknowns) // kernel.nodes

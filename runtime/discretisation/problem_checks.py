@@ -23,29 +23,29 @@ class ProblemError(SoftehlError, ValueError):
     """Error: a problem cannot be posed; the message gives the value and the allowed ones."""
 
 
-def require_known(what: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Raise ProblemError for a name that is not known."""
-    allowed = list(known)
-    for name in given:
+def require_known(what: str, names: Iterable[str], allowed: Iterable[str]) -> None:
+    """Raise ProblemError for a name that is not allowed."""
+    allowed = list(allowed)
+    for name in names:
         if name not in allowed:
             raise ProblemError(
                 f"no {what} {name!r}{did_you_mean(name, allowed)}; there are {join_names(allowed)}"
             )
 
 
-def in_order(block: ElementBlock, given: Any) -> Array:
+def in_order(block: ElementBlock, parameters: Any) -> Array:
     """Parameters of a block, an array or a mapping by name, in the order of its kernel."""
     names = block.kernel.parameters
-    if isinstance(given, Mapping):
-        require_known(f"parameter of block {block.name!r}", given, names)
-        missing = [name for name in names if name not in given]
+    if isinstance(parameters, Mapping):
+        require_known(f"parameter of block {block.name!r}", parameters, names)
+        missing = [name for name in names if name not in parameters]
         if missing:
             raise ProblemError(f"block {block.name!r} needs {', '.join(missing)} too")
-        given = [given[name] for name in names]
-    values = np.asarray(given)
+        parameters = [parameters[name] for name in names]
+    values = np.asarray(parameters)
     if values.dtype.kind not in "fiu" or values.shape != (len(names),):
         raise ProblemError(
-            f"block {block.name!r}: parameters {given!r}, must be {len(names)} numbers "
+            f"block {block.name!r}: parameters {parameters!r}, must be {len(names)} numbers "
             f"({join_names(names)})"
         )
     values = values.astype(np.float64, copy=False)
@@ -112,8 +112,8 @@ def _cell(block: ElementBlock) -> Cell | None:
 
 def element_name(block: ElementBlock, row: int) -> str:
     """An element for a message: its number, its block, and where it is if that is known."""
-    points = _places(block, row)
-    where = "" if points is None else f" at {_shown(points.mean(axis=0))}"
+    points = _element_points(block, row)
+    where = "" if points is None else f" at {_point_text(points.mean(axis=0))}"
     return f"element {row} of block {block.name!r}{where}"
 
 
@@ -130,7 +130,7 @@ def unknown_name(blocks: Iterable[ElementBlock], number: int) -> str:
     return ""
 
 
-def _places(block: ElementBlock, row: int) -> Array | None:
+def _element_points(block: ElementBlock, row: int) -> Array | None:
     dimension = len(getattr(block.kernel, "coordinates", ()))
     if not dimension:
         return None
@@ -138,8 +138,8 @@ def _places(block: ElementBlock, row: int) -> Array | None:
     return points
 
 
-def _shown(place: Array) -> str:
-    return "(" + ", ".join(f"{value:.4g}" for value in place) + ")"
+def _point_text(point: Array) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in point) + ")"
 
 
 def not_finite(block: ElementBlock, results: Sequence[Array]) -> str:

@@ -88,6 +88,6 @@ def hides(noise: float, size: float) -> bool:
     return noise > _SWAMPED * size
 
 
-def _ratio(off: float, size: float) -> float:
+def _ratio(deviation: float, size: float) -> float:
     """Norm of a defect over that of what it is measured by; 0 where there is no defect."""
-    return (off / size if size else math.inf) if off > 0.0 else 0.0
+    return (deviation / size if size else math.inf) if deviation > 0.0 else 0.0

@@ -120,10 +120,10 @@ class _NewEntries:
         n, k = self.dofs.shape
         return int(n * (k**2 - self.shared**2))
 
-    def positions(self, own: Integers, earlier: Sequence[Integers]) -> Integers:
+    def positions(self, own_entries: Integers, earlier: Sequence[Integers]) -> Integers:
         """Positions of all entries of the map from those of these, and of earlier maps."""
         if not self.shared:
-            return own
+            return own_entries
         n, k = self.dofs.shape
         previous = earlier[self.source]
         if k == self.shared:
@@ -131,7 +131,7 @@ class _NewEntries:
         result = np.empty((n, k, k), dtype=np.int64)
         result[:, : self.shared, : self.shared] = previous.reshape(n, self.shared, self.shared)
         rows, columns = self.local
-        result[:, rows, columns] = own.reshape(n, -1)
+        result[:, rows, columns] = own_entries.reshape(n, -1)
         return result.ravel()
 
 

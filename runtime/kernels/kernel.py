@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.kernels.kernel_call import ArgumentError, Call, Family, Given, Rule
+from softehl.runtime.kernels.kernel_call import ArgumentError, Call, CallArguments, Family, Rule
 from softehl.runtime.kernels.shared_library import (
     GENERATED,
     KernelError,
@@ -58,9 +58,9 @@ class Kernel(Family):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For `copy` and `pickle`."""
-        return _reloaded, (self.name, _place(self.library), self.signature)
+        return _reloaded, (self.name, _library_folder(self.library), self.signature)
 
-    def call(self, task: str, coordinates: Array, dofs: Array, **given: Any) -> Call:
+    def call(self, task: str, coordinates: Array, dofs: Array, **kwargs: Any) -> Call:
         """Return a checked call of a task, which can be repeated with other unknowns.
 
         Parameters
@@ -84,9 +84,9 @@ class Kernel(Family):
         ArgumentError
             An array has a wrong shape, or the kernel has no such task.
         """
-        return Call(self, task, coordinates, dofs, Given(**given))
+        return Call(self, task, coordinates, dofs, CallArguments(**kwargs))
 
-    def energy(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def energy(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Return the potential of each element.
 
         Parameters
@@ -108,10 +108,10 @@ class Kernel(Family):
         ArgumentError
             An array has a wrong shape, or the kernel has no such task.
         """
-        call = Call(self, "energy", coordinates, dofs, Given(**given))
+        call = Call(self, "energy", coordinates, dofs, CallArguments(**kwargs))
         return call.run(np.empty(call.n))
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Return the residuals: internal less external virtual work.
 
         Parameters
@@ -133,10 +133,10 @@ class Kernel(Family):
         ArgumentError
             An array has a wrong shape, or the kernel has no such task.
         """
-        call = Call(self, "residual", coordinates, dofs, Given(**given))
+        call = Call(self, "residual", coordinates, dofs, CallArguments(**kwargs))
         return call.run(np.empty((call.n, call.ndof)))
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
         """Return residuals and tangents.
 
         Parameters
@@ -160,11 +160,11 @@ class Kernel(Family):
         ArgumentError
             An array has a wrong shape, or the kernel has no such task.
         """
-        call = Call(self, "tangent", coordinates, dofs, Given(**given))
+        call = Call(self, "tangent", coordinates, dofs, CallArguments(**kwargs))
         tangent = np.empty((call.n, call.ndof, call.ndof))
         return call.run(np.empty((call.n, call.ndof)), tangent), tangent
 
-    def product(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+    def product(self, coordinates: Array, dofs: Array, direction: Array, **kwargs: Any) -> Array:
         """Return the tangents times a vector, without the tangents.
 
         Parameters
@@ -188,10 +188,12 @@ class Kernel(Family):
         ArgumentError
             An array has a wrong shape, or the kernel has no such task.
         """
-        call = Call(self, "product", coordinates, dofs, Given(direction=direction, **given))
+        call = Call(
+            self, "product", coordinates, dofs, CallArguments(direction=direction, **kwargs)
+        )
         return call.run(np.empty((call.n, call.ndof)))
 
-    def derivative(self, name: str, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def derivative(self, name: str, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Return the derivative of the residuals by an argument.
 
         Parameters
@@ -215,10 +217,12 @@ class Kernel(Family):
         ArgumentError
             An array has a wrong shape, or the kernel has no such derivative.
         """
-        call = Call(self, f"d_{name}", coordinates, dofs, Given(**given))
+        call = Call(self, f"d_{name}", coordinates, dofs, CallArguments(**kwargs))
         return call.run(np.empty((call.n, call.ndof)))
 
-    def pseudo_load(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+    def pseudo_load(
+        self, coordinates: Array, dofs: Array, direction: Array, **kwargs: Any
+    ) -> Array:
         """Return the derivative of the residuals along a variation of the elements.
 
         Parameters
@@ -242,10 +246,14 @@ class Kernel(Family):
         ArgumentError
             An array has a wrong shape, or the kernel has no such task.
         """
-        call = Call(self, "pseudo_load", coordinates, dofs, Given(direction=direction, **given))
+        call = Call(
+            self, "pseudo_load", coordinates, dofs, CallArguments(direction=direction, **kwargs)
+        )
         return call.run(np.empty((call.n, call.ndof)))
 
-    def fields_rate(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+    def fields_rate(
+        self, coordinates: Array, dofs: Array, direction: Array, **kwargs: Any
+    ) -> Array:
         """Return the derivative of `fields_at` along a variation.
 
         Parameters
@@ -269,10 +277,12 @@ class Kernel(Family):
         ArgumentError
             An array has a wrong shape, or the kernel has no such task.
         """
-        call = Call(self, "fields_rate", coordinates, dofs, Given(direction=direction, **given))
+        call = Call(
+            self, "fields_rate", coordinates, dofs, CallArguments(direction=direction, **kwargs)
+        )
         return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
 
-    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def fields_at(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Return the fields at the quadrature points.
 
         Parameters
@@ -294,7 +304,7 @@ class Kernel(Family):
         ArgumentError
             An array has a wrong shape, or the kernel has no such task.
         """
-        call = Call(self, "fields", coordinates, dofs, Given(**given))
+        call = Call(self, "fields", coordinates, dofs, CallArguments(**kwargs))
         return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
 
 
@@ -314,7 +324,7 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
         raise damaged_manifest(directory) from None
 
 
-def _place(library: Library) -> Path | None:
+def _library_folder(library: Library) -> Path | None:
     """Folder of a library; None for the kernels that ship, which each installation has."""
     return None if library.directory == GENERATED else library.directory
 

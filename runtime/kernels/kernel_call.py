@@ -96,7 +96,7 @@ class Family:
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class CallArguments:
     """Arguments of a call besides coordinates and unknowns; see `Family` for the shapes."""
 
     data: Array | None = None
@@ -114,14 +114,14 @@ class Call:
     """
 
     def __init__(
-        self, kernel: Family, task: str, coordinates: Array, dofs: Array, given: Given
+        self, kernel: Family, task: str, coordinates: Array, dofs: Array, arguments: CallArguments
     ) -> None:
         """Raises ArgumentError for a task, shape, kind or value that does not fit."""
         if task not in kernel.tasks:
             raise ArgumentError(f"{kernel.name} offers {', '.join(kernel.tasks)}, not {task}")
         self.kernel, self.task = kernel, task
         self.function = kernel.library.function(kernel.name, task)
-        self.rule = self._rule(given.rule)
+        self.rule = self._rule(arguments.rule)
         self.modes = self._modes()
         self.n = len(dofs)
         self.ndof = len(kernel.unknowns) + self.modes
@@ -129,10 +129,10 @@ class Call:
         self.read = (
             self._array("coordinates", coordinates, (self.n, width)) if width else _NOTHING,
             self._array("dofs", dofs, (self.n, self.ndof)),
-            *self._constants(given),
+            *self._constants(arguments),
             _NOTHING
-            if given.direction is None
-            else self._array("direction", given.direction, (self.n, self._along(task, width))),
+            if arguments.direction is None
+            else self._array("direction", arguments.direction, (self.n, self._along(task, width))),
             *self._tables(),
         )
 
@@ -153,28 +153,28 @@ class Call:
         design = width + len(self.kernel.data) + len(self.kernel.parameters)
         return design + (self.ndof if task == "fields_rate" else 0)
 
-    def _rule(self, given: Rule | None) -> Rule:
-        if given is None:
+    def _rule(self, arguments: Rule | None) -> Rule:
+        if arguments is None:
             return self.kernel.default_rule
         if self.kernel.unrolled:
             raise ArgumentError(
                 f"the quadrature rule of {self.kernel.name} is written into it: give none, or "
                 "write unroll=False on its page"
             )
-        return given
+        return arguments
 
-    def _constants(self, given: Given) -> tuple[Array, Array]:
+    def _constants(self, arguments: CallArguments) -> tuple[Array, Array]:
         """Data of elements and of their points side by side, (n, columns), and parameters."""
         kernel, n, points = self.kernel, self.n, len(self.rule.weights)
-        data = np.empty((n, 0)) if given.data is None else given.data
+        data = np.empty((n, 0)) if arguments.data is None else arguments.data
         data = self._array("data", data, (n, len(kernel.data)))
         parameters = self._array(
-            "parameters", self._ordered(given.parameters), (len(kernel.parameters),)
+            "parameters", self._ordered(arguments.parameters), (len(kernel.parameters),)
         )
         for condition in kernel.conditions:
             self._check(data, parameters, condition)
-        if kernel.point_data or given.point_data is not None:
-            at_points = _NOTHING if given.point_data is None else given.point_data
+        if kernel.point_data or arguments.point_data is not None:
+            at_points = _NOTHING if arguments.point_data is None else arguments.point_data
             columns = len(kernel.point_data)
             at_points = self._array("point_data", at_points, (n, points, columns))
             data = np.hstack([data, at_points.reshape(n, points * columns)])

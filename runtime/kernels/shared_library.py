@@ -122,10 +122,10 @@ class Library:
         function = getattr(self.loaded, name)
 
         def call(
-            span: tuple[int, int], parameters: Array, kept: Array, index: Any, x: Array, y: Array
+            span: tuple[int, int], parameters: Array, cached: Array, index: Any, x: Array, y: Array
         ) -> None:
             begin, end = span
-            numbers, data = _ffi.from_buffer(_INTS, index), (_pointer(parameters), _pointer(kept))
+            numbers, data = _ffi.from_buffer(_INTS, index), (_pointer(parameters), _pointer(cached))
             function(begin, end, data[0], data[1], numbers, _pointer(x), _pointer(y))
 
         return call
@@ -197,7 +197,7 @@ def _opened(path: Path, directory: Path, remedy: str = "") -> Library:
     remedy = remedy or _remedy(directory)
     if not path.exists():
         raise MissingKernelsError(f"the kernels are not built: {remedy}")
-    if not _whole(path):
+    if not _has_digest(path):
         raise StaleKernelsError(f"{path} or the digest beside it is damaged: {remedy}")
     try:
         manifest(directory)
@@ -214,7 +214,7 @@ def _opened(path: Path, directory: Path, remedy: str = "") -> Library:
     return library
 
 
-def _whole(path: Path) -> bool:
+def _has_digest(path: Path) -> bool:
     """True if the file beside a library has its SHA-256."""
     try:
         digest = path.with_name(DIGEST).read_text(encoding="ascii").split()

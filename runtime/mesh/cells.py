@@ -308,22 +308,22 @@ def for_vtk(kind: str, nodes: Integers) -> Integers:
     return nodes[:, list(CELLS[kind].mirrored)] if CELLS[kind].vtk_mirrored else nodes
 
 
-def jacobians(cell: Cell, places: Array, at: Array) -> Array:
+def jacobians(cell: Cell, node_points: Array, at: Array) -> Array:
     """Determinants (n, q) of the map of cells with nodes at `places` (n, k, dim) at parent points.
 
     `dim` must be the dimension of the cell.
     """
     if not cell.dimension:
-        return np.ones((len(places), len(at)))
-    gradient = np.tensordot(places, cell.gradient(at), axes=(1, 1)).transpose(0, 2, 1, 3)
+        return np.ones((len(node_points), len(at)))
+    gradient = np.tensordot(node_points, cell.gradient(at), axes=(1, 1)).transpose(0, 2, 1, 3)
     if cell.dimension == 2:
         (a, b), (c, d) = np.moveaxis(gradient, (2, 3), (0, 1))
         return np.asarray(a * d - b * c)
     return np.asarray(np.linalg.det(gradient))
 
 
-def measures(cell: Cell, places: Array, at: Array) -> Array:
+def measures(cell: Cell, node_points: Array, at: Array) -> Array:
     """Lengths or areas (n, q) per parent unit of faces with nodes at `places` (n, k, dim)."""
-    gradient = np.einsum("qkd,nkc->nqcd", cell.gradient(at), places)
+    gradient = np.einsum("qkd,nkc->nqcd", cell.gradient(at), node_points)
     metric = np.einsum("nqci,nqcj->nqij", gradient, gradient)
     return np.asarray(np.sqrt(np.linalg.det(metric)))

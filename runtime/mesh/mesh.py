@@ -411,7 +411,7 @@ class Mesh:
         """
         group = {}
         for kind, nodes in self.cells.items():
-            inside = _told(where, self.points[nodes].mean(axis=1), name)
+            inside = _evaluate_predicate(where, self.points[nodes].mean(axis=1), name)
             group[kind] = np.flatnonzero(inside)
         if not self.anywhere(any(map(len, group.values()))):
             raise MeshError(f"group {name!r}: the predicate chooses no cell")
@@ -472,7 +472,7 @@ class Mesh:
         """
         return nodes if self.piece is None else nodes[self.piece.owned[nodes]]
 
-    def require_whole(self, words: str) -> None:
+    def require_whole(self, context: str) -> None:
         """Require a mesh that is not distributed over processes.
 
         Parameters
@@ -486,7 +486,7 @@ class Mesh:
             The mesh is distributed.
         """
         if self.piece is not None:
-            raise MeshError(f"{words}: not for a mesh in parts; leave out spread=True")
+            raise MeshError(f"{context}: not for a mesh in parts; leave out spread=True")
 
     @cached_property
     def boundary(self) -> Faces:
@@ -605,7 +605,7 @@ class Mesh:
             There is no such side or group, or no node is selected.
         """
         if callable(where):
-            selected = np.flatnonzero(_told(where, self.points, "the predicate"))
+            selected = np.flatnonzero(_evaluate_predicate(where, self.points, "the predicate"))
             if not self.anywhere(len(selected)):
                 raise MeshError("the predicate chooses no node")
             return selected
@@ -804,7 +804,7 @@ class Mesh:
         check(self)
 
     def _meant_faces(self, where: Predicate, name: str) -> Faces:
-        inside = _told(where, self.points, name)
+        inside = _evaluate_predicate(where, self.points, name)
         candidates = {
             kind: faces[inside[faces].all(axis=1)] for kind, faces in self.boundary.items()
         }
@@ -821,12 +821,12 @@ def _frozen(name: str, given: Any) -> NDArray[Any]:
     return frozen(np.asarray(given))
 
 
-def _owned(arrays: Mapping[str, Any], words: str) -> Mapping[str, Any]:
+def _owned(arrays: Mapping[str, Any], context: str) -> Mapping[str, Any]:
     """Arrays by kind, none of which anybody can write to.  Raises MeshError."""
-    return MappingProxyType({k: _frozen(f"{words}{k}", n) for k, n in arrays.items()})
+    return MappingProxyType({k: _frozen(f"{context}{k}", n) for k, n in arrays.items()})
 
 
-def _told(where: Predicate, places: Array, name: str) -> Flags:
+def _evaluate_predicate(where: Predicate, places: Array, name: str) -> Flags:
     signature_error = misfit(where, "x")
     if signature_error:
         raise MeshError(f"{name}: {signature_error}, x of shape (n, dim)")

@@ -88,7 +88,9 @@ def join_partitions(mesh: Mesh, numbers: Integers) -> Mesh:
     }
     sides = {
         name: {
-            kind: faces[~_common(faces, CELLS[kind].corners, numbers, shared, before=True)]
+            kind: faces[
+                ~_common(faces, CELLS[kind].corners, numbers, shared, lower_ranks_only=True)
+            ]
             for kind, faces in side.items()
         }
         for name, side in mesh.sides.items()
@@ -123,12 +125,12 @@ def _with_names_of_all(mesh: Mesh) -> Mesh:
     )
 
 
-def _shared(numbers: Integers, ends: Integers) -> dict[int, Integers]:
+def _shared(numbers: Integers, end_nodes: Integers) -> dict[int, Integers]:
     """Process -> nodes that it has too, of those at the ends of the part.
 
     A node is looked up by the process that its number falls to, which no process chooses.
     """
-    comm, end_numbers = world(), numbers[ends]
+    comm, end_numbers = world(), numbers[end_nodes]
     received = comm.alltoall([end_numbers[end_numbers % comm.size == p] for p in range(comm.size)])
     every = np.concatenate(received)
     process = np.repeat(np.arange(comm.size), [len(part) for part in received])
@@ -145,7 +147,7 @@ def _shared(numbers: Integers, ends: Integers) -> dict[int, Integers]:
     pairs_here = np.concatenate(comm.alltoall([np.concatenate(rows) for rows in pairs]))
     pairs_here = pairs_here[np.argsort(pairs_here[:, 0], kind="stable")]
     rank = np.argsort(end_numbers)
-    nodes = ends[rank[np.searchsorted(end_numbers[rank], pairs_here[:, 0])]]
+    nodes = end_nodes[rank[np.searchsorted(end_numbers[rank], pairs_here[:, 0])]]
     return {int(p): nodes[pairs_here[:, 1] == p] for p in np.unique(pairs_here[:, 1])}
 
 
@@ -155,7 +157,7 @@ def _common(
     numbers: Integers,
     shared: Mapping[int, Integers],
     *,
-    before: bool = False,
+    lower_ranks_only: bool = False,
 ) -> Flags:
     """Which of the faces (m, k) another process has too; before: one of lower number."""
     comm = world()
@@ -167,6 +169,10 @@ def _common(
         sent[process] = corners_here[node_mask[faces[:, :corners]].all(axis=1)]
     is_common: Flags = np.zeros(len(faces), dtype=bool)
     for process, other_faces in enumerate(comm.alltoall(sent)):
-        if other_faces is not None and len(other_faces) and (process < comm.rank or not before):
+        if (
+            other_faces is not None
+            and len(other_faces)
+            and (process < comm.rank or not lower_ranks_only)
+        ):
             is_common |= match_faces(corners_here, other_faces, corners) >= 0
     return is_common

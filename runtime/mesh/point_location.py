@@ -60,15 +60,19 @@ class PointLocator:
     holds it. Of cells that hold a point only those of the highest dimension are told.
     """
 
-    def __init__(self, points: Array, cells: Mapping[str, Integers], near: float) -> None:
-        self.points, self.cells, self.near = np.asarray(points, dtype=np.float64), cells, near
+    def __init__(self, points: Array, cells: Mapping[str, Integers], tolerance: float) -> None:
+        self.points, self.cells, self.tolerance = (
+            np.asarray(points, dtype=np.float64),
+            cells,
+            tolerance,
+        )
         order = sorted(cells, key=lambda kind: -CELLS[kind].dimension)
         self.kinds = tuple(kind for kind in order if len(cells[kind]))
 
     @cached_property
     def _sets(self) -> dict[str, list[_Boxes]]:
         return {
-            kind: list(_boxes(CELLS[kind], self.points[self.cells[kind]], self.near))
+            kind: list(_boxes(CELLS[kind], self.points[self.cells[kind]], self.tolerance))
             for kind in self.kinds
         }
 
@@ -77,38 +81,38 @@ class PointLocator:
         used = [nodes.ravel() for nodes in self.cells.values()]
         return cKDTree(self.points[np.unique(np.concatenate(used))])
 
-    def holding(self, places: Array, chosen: Mapping[str, Flags] | None = None) -> Located:
+    def holding(self, queries: Array, masks: Mapping[str, Flags] | None = None) -> Located:
         """Cells that hold the places (n, dim), of the chosen ones: kind -> (m,) booleans."""
-        places = np.asarray(places, dtype=np.float64)
-        left, done = np.arange(len(places)), 0
+        queries = np.asarray(queries, dtype=np.float64)
+        left, done = np.arange(len(queries)), 0
         pairs: list[_Pairs] = []
         for number, kind in enumerate(self.kinds):
             if CELLS[kind].dimension != done:  # nothing of a lower dimension where a cell is
                 done = CELLS[kind].dimension
                 for _, point, *_ in pairs:
                     left = np.setdiff1d(left, point)
-            point, row = self._candidates(kind, places[left], np.zeros(len(left)))
+            point, row = self._candidates(kind, queries[left], np.zeros(len(left)))
             point = left[point]
-            if chosen is not None:
-                in_cells = chosen.get(kind, np.zeros(len(self.cells[kind]), np.bool_))[row]
+            if masks is not None:
+                in_cells = masks.get(kind, np.zeros(len(self.cells[kind]), np.bool_))[row]
                 point, row = point[in_cells], row[in_cells]
-            parent, distance = self._feet(kind, row, places[point])
-            inside = distance <= self.near
+            parent, distance = self._feet(kind, row, queries[point])
+            inside = distance <= self.tolerance
             pairs.append(
                 (np.full(inside.sum(), number), point[inside], row[inside], parent[inside])
             )
         return self._sorted(pairs)
 
-    def nearest(self, places: Array) -> Located:
+    def nearest(self, queries: Array) -> Located:
         """The nearest cell of each place (n, dim), and the parent coordinates of its point that
         is nearest.
         """
-        places = np.asarray(places, dtype=np.float64)
-        reach = np.asarray(self._nodes.query(places)[0])  # no cell is further than the next node
+        queries = np.asarray(queries, dtype=np.float64)
+        reach = np.asarray(self._nodes.query(queries)[0])  # no cell is further than the next node
         pairs, distances = [], []
         for number, kind in enumerate(self.kinds):
-            point, row = self._candidates(kind, places, reach)
-            parent, distance = self._feet(kind, row, places[point])
+            point, row = self._candidates(kind, queries, reach)
+            parent, distance = self._feet(kind, row, queries[point])
             pairs.append((np.full(len(row), number), point, row, parent))
             distances.append(distance)
         kind_of, point, row, parent = (np.concatenate(part) for part in zip(*pairs, strict=True))
@@ -122,30 +126,30 @@ class PointLocator:
             parent[nearest_pairs],
         )
 
-    def _sorted(self, found: list[_Pairs]) -> Located:
-        if not found:
+    def _sorted(self, pairs: list[_Pairs]) -> Located:
+        if not pairs:
             none = np.empty(0, np.int64)
             return Located(self.kinds, none, none, none, np.empty((0, 3)))
-        number, point, row, parent = (np.concatenate(part) for part in zip(*found, strict=True))
+        number, point, row, parent = (np.concatenate(part) for part in zip(*pairs, strict=True))
         order = np.lexsort((row, number, point))
         return Located(self.kinds, point[order], number[order], row[order], parent[order])
 
-    def _candidates(self, kind: str, places: Array, reach: Array) -> tuple[Integers, Integers]:
+    def _candidates(self, kind: str, queries: Array, reach: Array) -> tuple[Integers, Integers]:
         """Pairs of a place and a cell whose box is no further from it than the reach (n,)."""
         points, rows = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
         for boxes in self._sets[kind]:
-            lists = boxes.tree.query_ball_point(places, boxes.radius + reach, return_sorted=False)
+            lists = boxes.tree.query_ball_point(queries, boxes.radius + reach, return_sorted=False)
             count = np.fromiter(map(len, lists), np.int64, len(lists))
-            point = np.repeat(np.arange(len(places)), count)
+            point = np.repeat(np.arange(len(queries)), count)
             members = np.concatenate([np.empty(0, np.int64), *lists]).astype(np.int64)
-            x = places[point]
+            x = queries[point]
             away = np.maximum(np.maximum(boxes.low[members] - x, x - boxes.high[members]), 0.0)
             close = np.linalg.norm(away, axis=1) <= reach[point]
             points.append(point[close])
             rows.append(boxes.rows[members[close]])
         return np.concatenate(points), np.concatenate(rows)
 
-    def _feet(self, kind: str, rows: Integers, places: Array) -> tuple[Array, Array]:
+    def _feet(self, kind: str, rows: Integers, queries: Array) -> tuple[Array, Array]:
         """Of each cell the parent coordinates (m, 3) of its point that is near the place, and how
         far that is from it (m,).
         """
@@ -155,7 +159,7 @@ class PointLocator:
         for first in range(0, len(rows), step):
             part = slice(first, first + step)
             x = self.points[nodes[rows[part]]]
-            xi, away = _inverse(cell, x, places[part], self.near)
+            xi, away = _inverse(cell, x, queries[part], self.tolerance)
             parent[part, : cell.dimension], distance[part] = xi, away
         return parent, distance
 
@@ -175,7 +179,7 @@ class _Boxes:
     radius: float
 
 
-def _boxes(cell: Cell, x: Array, near: float) -> Iterator[_Boxes]:
+def _boxes(cell: Cell, x: Array, tolerance: float) -> Iterator[_Boxes]:
     """Cells with nodes x (m, k, dim), those of sizes between two powers of two together."""
     low, high = x[:, 0].copy(), x[:, 0].copy()
     for corner in range(1, cell.corners):  # much faster than min(axis=1)
@@ -185,7 +189,7 @@ def _boxes(cell: Cell, x: Array, near: float) -> Iterator[_Boxes]:
         straight = np.einsum("kc,ncd->nkd", _by_corners(cell.name), x[:, : cell.corners])
         bulge = _bulge(cell.name) * np.abs(x - straight).max(axis=1)
         low, high = low - bulge, high + bulge
-    low, high = low - near, high + near
+    low, high = low - tolerance, high + tolerance
     middle, radius = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1)
     size = np.frexp(radius)[1]
     for power in np.unique(size):
@@ -222,40 +226,40 @@ def _bulge(kind: str) -> float:
     return 1.05 * float(np.abs(cell.shape(at)[:, cell.corners :]).sum(axis=1).max())
 
 
-def _inverse(cell: Cell, x: Array, places: Array, near: float) -> tuple[Array, Array]:
+def _inverse(cell: Cell, x: Array, queries: Array, tolerance: float) -> tuple[Array, Array]:
     """Parent coordinates (m, d), in the parent element, of points of cells with nodes x (m, k, dim)
     near the places (m, dim), and their distances (m,).
     """
     centre = cell.nodes[: cell.corners].mean(axis=0)
     xi = np.broadcast_to(centre, (len(x), cell.dimension)).copy()
     if not cell.dimension:
-        return xi, np.linalg.norm(x[:, 0] - places, axis=1)
-    xi = _newton(cell, x, places, xi)
-    distance = _distance(cell, x, places, xi)
+        return xi, np.linalg.norm(x[:, 0] - queries, axis=1)
+    xi = _newton(cell, x, queries, xi)
+    distance = _distance(cell, x, queries, xi)
     if cell.order > 1:  # of a cell that is bent the nearest node may be the better start
-        again = np.flatnonzero(distance > near)
-        start = cell.nodes[np.linalg.norm(x[again] - places[again, None], axis=2).argmin(axis=1)]
-        other = _newton(cell, x[again], places[again], 0.9 * start + 0.1 * centre)
-        better = _distance(cell, x[again], places[again], other)
+        again = np.flatnonzero(distance > tolerance)
+        start = cell.nodes[np.linalg.norm(x[again] - queries[again, None], axis=2).argmin(axis=1)]
+        other = _newton(cell, x[again], queries[again], 0.9 * start + 0.1 * centre)
+        better = _distance(cell, x[again], queries[again], other)
         improved = again[better < distance[again]]
         xi[improved] = other[better < distance[again]]
-        distance = _distance(cell, x, places, xi)
+        distance = _distance(cell, x, queries, xi)
     return cell.clipped(xi, 0.0), distance
 
 
-def _distance(cell: Cell, x: Array, places: Array, xi: Array) -> Array:
+def _distance(cell: Cell, x: Array, queries: Array, xi: Array) -> Array:
     """Distances (m,) of the places from the points of the cells at xi, taken into the cells."""
     feet = np.einsum("mk,mkd->md", cell.shape(cell.clipped(xi, 0.0)), x)
-    return np.asarray(np.linalg.norm(feet - places, axis=1))
+    return np.asarray(np.linalg.norm(feet - queries, axis=1))
 
 
-def _newton(cell: Cell, x: Array, places: Array, xi: Array) -> Array:
+def _newton(cell: Cell, x: Array, queries: Array, xi: Array) -> Array:
     """Parent coordinates (m, d) of the points of the cells that are nearest to the places, not far
     outside the parent element.
     """
     xi, active = xi.copy(), np.arange(len(x))
     for _ in range(_ITERATIONS):
-        miss = places[active] - np.einsum("mk,mkd->md", cell.shape(xi[active]), x[active])
+        miss = queries[active] - np.einsum("mk,mkd->md", cell.shape(xi[active]), x[active])
         slope = np.einsum("mkc,mkd->mdc", cell.gradient(xi[active]), x[active])
         new = cell.clipped(xi[active] + _solved(slope, miss), _BEYOND)
         moving = np.abs(new - xi[active]).max(axis=1) > _STEADY

@@ -159,12 +159,12 @@ class DistributedProblem:
     def residual(self, x: Array) -> Array:
         """See the class."""
         r = self.team.exchange.added(self.problem.assembler.residual(x, self.parameters))
-        return self._prescribed(r, x - self._wanted(x))
+        return self._prescribed(r, x - self._with_prescribed(x))
 
     def linearise(self, x: Array) -> tuple[Array, DistributedFactors]:
         """Residual with the influence of prescribed unknowns moved into it, and the tangent."""
         tangent = self.team.tangent_of(self.problem)
-        defect = x - self._wanted(x)
+        defect = x - self._with_prescribed(x)
         r = tangent.fill(
             self.problem.assembler,
             x,
@@ -197,7 +197,7 @@ class DistributedProblem:
             terms = self._terms(np.abs(x)[owned], K)
             if rounded:
                 noise = ROUNDING * self._terms(np.abs(x)[owned] + self._reach(), K)
-        target = self._wanted(x)
+        target = self._with_prescribed(x)
         free = np.ones(len(x), dtype=bool)
         free[problem.fixed] = False
         defect = np.maximum(np.abs(r) - noise, 0.0) * free[owned]
@@ -232,7 +232,7 @@ class DistributedProblem:
                 message = element_name(global_block, int(part.elements[block.name][rows[0]]))
         return _first(message)
 
-    def _wanted(self, x: Array) -> Array:
+    def _with_prescribed(self, x: Array) -> Array:
         """x with the prescribed values."""
         target = x.copy()
         target[self.problem.fixed] = self.problem.values
@@ -283,6 +283,6 @@ class DistributedProblem:
         return [np.flatnonzero(np.isin(owned, numbers)) for numbers in self.problem.layout.fields]
 
 
-def _first(words: str) -> str:
+def _first(message: str) -> str:
     """Message of the first process that has one."""
-    return next((w for w in world().allgather(words) if w), "")
+    return next((w for w in world().allgather(message) if w), "")

@@ -41,7 +41,7 @@ class Engine(Protocol):
         """The part of the equations that this process has; see `Communicator`."""
         ...
 
-    def newton(self, system: System, given: Newton | None) -> Newton:
+    def newton(self, system: System, requested: Newton | None) -> Newton:
         """Newton's method with the linear solver of the distributed equations."""
         ...
 
@@ -70,12 +70,12 @@ class Serial:
             else replace(system, comm=MultigridModesCommunicator(nullspace))
         )
 
-    def newton(self, system: System, given: Newton | None) -> Newton:
+    def newton(self, system: System, requested: Newton | None) -> Newton:
         """See `Engine`."""
-        if given is not None and self.linear != "auto":
+        if requested is not None and self.linear != "auto":
             raise StudyError("newton and linear: give one of them, newton has a linear solver")
-        if given is not None:
-            return given
+        if requested is not None:
+            return requested
         solver, self.note = linear_solver(system, self.linear)
         return Newton(linear=FactorisationCache(solver))
 

@@ -83,9 +83,9 @@ class MatrixFree:
         iteration = KrylovSettings(self.tolerance, self.most, self.iterations)
         return replace(system, comm=_MatrixFreeCommunicator(levels, iteration))
 
-    def newton(self, system: System, given: Newton | None) -> Newton:
+    def newton(self, system: System, requested: Newton | None) -> Newton:
         """See `Engine`."""
-        return replace(given or Newton(), linear=MatrixFreeSolver())
+        return replace(requested or Newton(), linear=MatrixFreeSolver())
 
 
 @dataclass(frozen=True)
@@ -138,9 +138,9 @@ class _MatrixFreeCommunicator(Communicator):
     def __init__(self, levels: MultigridLevels, iteration: KrylovSettings) -> None:
         self.levels, self.iteration = levels, iteration
 
-    def local_problem(self, posed: MatrixFreeProblem) -> Problem:
+    def local_problem(self, distributed: MatrixFreeProblem) -> Problem:
         """See `Communicator`."""
-        return posed.problem
+        return distributed.problem
 
     def with_other_elements(self) -> Communicator:
         """See `Communicator`.  Raises StudyError."""

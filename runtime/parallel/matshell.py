@@ -39,15 +39,15 @@ class MatrixFreeShell:
     problem: Problem
     levels: MultigridLevels
     exchange: HaloExchange
-    held: Flags = field(init=False)
+    constrained: Flags = field(init=False)
     ties: Ties = field(init=False)
     local: alone.MatrixFreeOperator = field(init=False)
     matrix: Any = field(init=False)
-    own: Array = field(init=False)
+    own_diagonal: Array = field(init=False)
 
     def __post_init__(self) -> None:
         """An empty shell."""
-        self.held = np.isin(self.exchange.owned, self.problem.fixed)
+        self.constrained = np.isin(self.exchange.owned, self.problem.fixed)
         self.ties = ties_of(self.problem, self.levels)
         sizes = self.exchange.vector.getSizes()
         self.matrix = petsc().Mat().createPython((sizes, sizes), self, comm=world())
@@ -66,7 +66,7 @@ class MatrixFreeShell:
         r = assembler.residual(x, parameters)
         once = alone.KrylovSettings(0.0, 0)
         self.local = alone.MatrixFreeOperator.of(problem, self.levels, once, self.ties, x)
-        self.own = self.exchange.added(self.local.diagonals)
+        self.own_diagonal = self.exchange.added(self.local.diagonals)
         if defect.any():
             r -= self.local.times(defect)
         times.kernels += time.perf_counter() - began
@@ -78,15 +78,15 @@ class MatrixFreeShell:
         x = self.exchange.local(source)
         x[self.problem.fixed] = 0.0
         y = self.exchange.added(self.local.times(x))
-        target.array[positions] = np.where(self.held, source.array_r[positions], y)
+        target.array[positions] = np.where(self.constrained, source.array_r[positions], y)
 
     def getDiagonal(self, _: Any, target: Any) -> None:
         """PETSc's call."""
-        target.array[self.exchange.positions] = np.where(self.held, 1.0, self.own)
+        target.array[self.exchange.positions] = np.where(self.constrained, 1.0, self.own_diagonal)
 
     def diagonal(self) -> Array:
         """Magnitudes of the diagonal of K, own rows, (k,)."""
-        return np.where(self.held, 1.0, np.abs(self.own))
+        return np.where(self.constrained, 1.0, np.abs(self.own_diagonal))
 
     def times(self, x: Array) -> Array:
         """K times own values x, (k,): own rows, (k,)."""
@@ -97,7 +97,7 @@ class MatrixFreeShell:
     def times_magnitudes(self, x: Array) -> Array:
         """A bound of |K| times own values x, (k,), at least 0: own rows, (k,)."""
         exchange, problem = self.exchange, self.problem
-        root = np.where(self.held, 0.0, np.sqrt(np.abs(self.own)))
+        root = np.where(self.constrained, 0.0, np.sqrt(np.abs(self.own_diagonal)))
         local = exchange.local(exchange.to_petsc(root * x))
         return np.asarray(
             root * exchange.added(problem.assembler.around(local, problem.parameters))
@@ -116,11 +116,11 @@ class MatrixFreeShell:
         """None is known."""
         return -1
 
-    def prepare(self, ksp: Any, near: Any) -> None:
+    def prepare(self, ksp: Any, nullspace: Any) -> None:
         """See `parallel.petsc_matrix.Tangent`."""
         ksp.setType("cg" if self._is_symmetric() else "gmres")
         ksp.setTolerances(rtol=TOLERANCE, max_it=1000)
-        lower, step = self._lower(near)
+        lower, step = self._lower(nullspace)
         pc = ksp.getPC()
         pc.setType("mg")
         pc.setMGLevels(2)
@@ -139,14 +139,14 @@ class MatrixFreeShell:
         below.setOperators(lower, lower)
 
     def _is_symmetric(self) -> bool:
-        numbers = np.random.default_rng(world().rank).uniform(-1.0, 1.0, (2, len(self.held)))
+        numbers = np.random.default_rng(world().rank).uniform(-1.0, 1.0, (2, len(self.constrained)))
         u, v = (self.exchange.to_petsc(row) for row in numbers)
         Ku, Kv = u.duplicate(), v.duplicate()
         self.matrix.mult(u, Ku)
         self.matrix.mult(v, Kv)
         return bool(abs(u.dot(Kv) - v.dot(Ku)) <= 1e-10 * u.norm() * Kv.norm())
 
-    def _lower(self, near: Any) -> tuple[Any, Any]:
+    def _lower(self, nullspace: Any) -> tuple[Any, Any]:
         """The matrix at the lower order, and the interpolation from there."""
         exchange, levels, free = self.exchange, self.levels, self.local.ties.free
         numbers, local = self._numbers()
@@ -163,9 +163,9 @@ class MatrixFreeShell:
         ones = numbers[np.isin(levels.unknowns[1], owned_lower[~free[owned_lower]])]
         entries = np.append(numbers[lower.row], ones), np.append(numbers[lower.col], ones)
         values = np.append(lower.data, np.full(len(ones), typical))
-        A = _matrix(entries, values, (sizes, sizes), levels.components if near else 1)
-        if near is not None:
-            A.setNearNullSpace(self._motions(A, near, local))
+        A = _matrix(entries, values, (sizes, sizes), levels.components if nullspace else 1)
+        if nullspace is not None:
+            A.setNearNullSpace(self._motions(A, nullspace, local))
         return A, P
 
     def _numbers(self) -> tuple[Integers, Integers]:
@@ -177,12 +177,12 @@ class MatrixFreeShell:
         local = np.flatnonzero(mask)
         return exchange.renumbered(mask)[0][lower], local[np.argsort(exchange.positions[local])]
 
-    def _motions(self, A: Any, near: Any, chosen: Integers) -> Any:
+    def _motions(self, A: Any, nullspace: Any, owned_local: Integers) -> Any:
         """The motions at the nodes of the lower level, made orthogonal."""
         vectors: list[Any] = []
-        for vector in near.getVecs():
+        for vector in nullspace.getVecs():
             level_vector = A.createVecRight()
-            level_vector.array[:] = vector.array_r[self.exchange.positions[chosen]]
+            level_vector.array[:] = vector.array_r[self.exchange.positions[owned_local]]
             for other in vectors:
                 level_vector.axpy(-level_vector.dot(other), other)
             level_vector.normalize()

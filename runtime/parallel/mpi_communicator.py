@@ -53,7 +53,7 @@ class MpiCommunicator(Communicator):
     def gather(self, x: Array) -> Array:
         """See `Communicator`."""
         part = self.team.part
-        return _gathered(x[..., part.owned], part.unknowns[part.owned], self._whole.size)
+        return _gathered(x[..., part.owned], part.unknowns[part.owned], self._global_system.size)
 
     def restrict(self, x: Array) -> Array:
         """See `Communicator`."""
@@ -62,7 +62,7 @@ class MpiCommunicator(Communicator):
     def gather_cells(self, block: str, values: Array) -> Array:
         """See `Communicator`."""
         rows = self.team.part.elements[block]
-        count = len(self._whole.blocks[block].nodes)
+        count = len(self._global_system.blocks[block].nodes)
         return np.moveaxis(_gathered(np.moveaxis(values, 0, -1), rows, count), -1, 0)
 
     def restrict_cells(self, block: str, values: Array) -> Array:
@@ -73,7 +73,7 @@ class MpiCommunicator(Communicator):
         """See `Communicator`."""
         part = self.team.part
         owned = self.team.exchange.added(forces)
-        return _gathered(owned, part.unknowns[part.owned], self._whole.size)
+        return _gathered(owned, part.unknowns[part.owned], self._global_system.size)
 
     def sum_shared(self, x: Array) -> Array:
         """See `Communicator`."""
@@ -92,9 +92,9 @@ class MpiCommunicator(Communicator):
         """See `Communicator`."""
         return DistributedConstraints.of(problem, self.team.part, self.team.exchange)
 
-    def local_problem(self, posed: DistributedProblem) -> Problem:
+    def local_problem(self, distributed: DistributedProblem) -> Problem:
         """See `Communicator`."""
-        return posed.problem
+        return distributed.problem
 
     def lowest_modes(
         self, problem: Problem, K: csc_array, M: csc_array, count: int
@@ -127,7 +127,7 @@ class MpiCommunicator(Communicator):
         world().Barrier()
 
     @property
-    def _whole(self) -> System:
+    def _global_system(self) -> System:
         return self.team.part.system.everywhere
 
 
@@ -185,9 +185,9 @@ class PartitionedMeshCommunicator(MpiCommunicator):
         return result
 
 
-def _gathered(values: Array, places: Integers, count: int) -> Array:
+def _gathered(values: Array, positions: Integers, count: int) -> Array:
     """The array (..., count) of which each process has `values` at its own `places`."""
     flat = values.reshape(-1, values.shape[-1]) if values.ndim > 1 else values[None]
     result = np.zeros((len(flat), count))
-    result[:, places] = flat
+    result[:, positions] = flat
     return np.asarray(global_sum(result).reshape(*values.shape[:-1], count))

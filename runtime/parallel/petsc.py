@@ -100,9 +100,9 @@ class Petsc:
             )
         return require_products(system)[1]
 
-    def newton(self, system: System, given: Newton | None) -> Newton:
+    def newton(self, system: System, requested: Newton | None) -> Newton:
         """See `Engine`."""
-        return replace(given or Newton(), linear=DistributedSolver())
+        return replace(requested or Newton(), linear=DistributedSolver())
 
 
 def _cut(system: System, cells: CellGraph) -> Integers:
@@ -145,12 +145,12 @@ def _rigid_motions(part: LocalSystem, interleaved: int, outer: ExternalUnknowns)
     return petsc().NullSpace().createRigidBody(vector)
 
 
-def _spans(part: LocalSystem, own: Integers) -> dict[str, Flags]:
+def _spans(part: LocalSystem, owned: Integers) -> dict[str, Flags]:
     """Unknown -> which of own ones, by their local numbers, are of that name; no internal ones."""
     layout, blocks = part.system.numbering.layout, part.system.assembler.blocks
     inner = {name for block in blocks for name in block.internal}
     spans = {name: layout.part(name) for name in layout.names if name not in inner}
-    return {name: (own >= span.start) & (own < span.stop) for name, span in spans.items()}
+    return {name: (owned >= span.start) & (owned < span.stop) for name, span in spans.items()}
 
 
 def _fields(part: LocalSystem, outer: ExternalUnknowns) -> dict[str, Integers]:

@@ -58,7 +58,7 @@ class PetscMatrix:
     exchange: HaloExchange
     outer: ExternalUnknowns
     pieces: list[CondensedElements] = field(default_factory=list)
-    own: Array = field(default_factory=lambda: np.empty(0))
+    own_diagonal: Array = field(default_factory=lambda: np.empty(0))
 
     @classmethod
     def of(
@@ -102,7 +102,7 @@ class PetscMatrix:
         """Of PETSc's vectors."""
         return self.outer.exchange
 
-    def places(self, assembler: Assembler) -> Iterator[tuple[Any, Array]]:
+    def element_entries(self, assembler: Assembler) -> Iterator[tuple[Any, Array]]:
         """Pieces of blocks, with the place of their tangents' entries."""
         first = 0
         for block in assembler.blocks:
@@ -127,7 +127,7 @@ class PetscMatrix:
         free[self.fixed] = False
         moved = bool(defect.any())
         self.pieces = []
-        for piece, entries in self.places(assembler):
+        for piece, entries in self.element_entries(assembler):
             if not len(piece.dofs):
                 continue
             if piece.name not in parameters:
@@ -139,7 +139,7 @@ class PetscMatrix:
             if moved:
                 local = local - np.einsum("nij,nj->ni", tangents, defect[piece.dofs])
             np.add.at(r, piece.dofs.ravel(), local.ravel())
-        self.own = np.where(free[self.exchange.owned], self.exchange.added(diagonal), 1.0)
+        self.own_diagonal = np.where(free[self.exchange.owned], self.exchange.added(diagonal), 1.0)
         between = time.perf_counter()
         self.matrix.setValuesCOO(self.values, petsc().InsertMode.INSERT_VALUES)
         times.kernels += between - began
@@ -176,7 +176,7 @@ class PetscMatrix:
 
     def diagonal(self) -> Array:
         """Magnitudes of the diagonal of K, own rows, (k,)."""
-        return np.abs(self.own)
+        return np.abs(self.own_diagonal)
 
     def times(self, x: Array) -> Array:
         """K times own values x, (k,): own rows, (k,)."""
@@ -210,7 +210,7 @@ class PetscMatrix:
             return self.exchange.added(y)
         return np.asarray(y[self.exchange.owned])
 
-    def prepare(self, ksp: Any, near: Any) -> None:
+    def prepare(self, ksp: Any, nullspace: Any) -> None:
         """Krylov method and preconditioner, where no option says otherwise.
 
         near: motions that multigrid should know of, or None.
@@ -225,8 +225,8 @@ class PetscMatrix:
             ksp.setTolerances(rtol=1e-6, max_it=500)
             ksp.setGMRESRestart(60)
             pc.setType("gamg")
-        if near is not None:
-            self.matrix.setNearNullSpace(near)
+        if nullspace is not None:
+            self.matrix.setNearNullSpace(nullspace)
 
     def empty_row(self) -> int:
         """PETSc's number of a row of zeros, -1 if there is none."""
@@ -285,7 +285,7 @@ class DistributedOperator(Protocol):
         """See the class."""
         ...
 
-    def prepare(self, ksp: Any, near: Any) -> None:
+    def prepare(self, ksp: Any, nullspace: Any) -> None:
         """See the class."""
         ...
 
@@ -304,7 +304,7 @@ class PetscSolver:
     """
 
     options: Mapping[str, object]
-    near: Any = None
+    nullspace: Any = None
     fields: Mapping[str, Integers] = field(default_factory=dict)
     times: SolverTimes = field(default_factory=SolverTimes)
     _ksp: Any = field(default=None, init=False, repr=False)
@@ -360,7 +360,7 @@ class PetscSolver:
         PETSc = petsc()
         ksp = PETSc.KSP().create(world())
         pc = ksp.getPC()
-        tangent.prepare(ksp, self.near)
+        tangent.prepare(ksp, self.nullspace)
         database = PETSc.Options()
         for name, value in self.options.items():
             database[name.removeprefix("-")] = value

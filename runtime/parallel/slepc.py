@@ -60,7 +60,7 @@ class DistributedConstraints:
         """T' f: own sums over all processes of forces (m,) that the elements of each have."""
         return self.exchange.added(forces[self.free])
 
-    def spread(self, z: Array) -> Array:
+    def expand(self, z: Array) -> Array:
         """T z: unknowns (m,) of own free ones."""
         x = np.zeros(self.size)
         x[self.free] = self.exchange.copied(z)
@@ -180,12 +180,12 @@ class Pencil:
         return matrix
 
     def _local(self, vector: Any) -> Array:
-        return self.free.spread(np.array(vector.array_r[self.exchange.positions]))
+        return self.free.expand(np.array(vector.array_r[self.exchange.positions]))
 
     def _nearly_singular(self, factors: _ShiftedFactors) -> bool:
         """See `solve.eigen.nearly_singular`."""
         b = np.random.default_rng(world().rank).uniform(-1.0, 1.0, len(self.exchange.owned))
-        x = self.free.spread(factors.solve(b))
+        x = self.free.expand(factors.solve(b))
         size = self.free.gather(abs(self.K) @ np.abs(x))
         largest_entries = [global_max(float(np.abs(v).max(initial=0.0))) for v in (b, size)]
         return bool(largest_entries[0] <= 1e-11 * largest_entries[1])

@@ -410,13 +410,13 @@ class _ArclengthStepper(Stepper):
 
     def attempt(self, step: float) -> _ArclengthAttempt:
         """Predict and correct; onto the bound of the parameter where that is passed."""
-        trial = self._predict_and_correct(step)
-        if trial.converged:
-            trial = self._check_smoothness(trial, step)
-        if not trial.converged or self.within[0] <= trial.parameter <= self.within[1]:
-            return trial
-        self.log.count(trial.solution)
-        return self._stop_at_bound(trial)
+        candidate = self._predict_and_correct(step)
+        if candidate.converged:
+            candidate = self._check_smoothness(candidate, step)
+        if not candidate.converged or self.within[0] <= candidate.parameter <= self.within[1]:
+            return candidate
+        self.log.count(candidate.solution)
+        return self._stop_at_bound(candidate)
 
     def accept(self, attempt: StepAttempt) -> None:
         """See `Stepper`; a fold that was passed is located first."""

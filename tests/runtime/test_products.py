@@ -90,7 +90,9 @@ def test_products_are_those_of_assembled_tangents(
         assert count == 1 or kind.startswith("hex") or all(a < b for a, b in places.runs)
         found = np.zeros(len(x))
         product = ElementProduct.of(block, x, parameters, places)
-        assert product.kept.ctypes.data % 64 == 0, "vectors of lanes lie in two lines of the cache"
+        assert product.cached.ctypes.data % 64 == 0, (
+            "vectors of lanes lie in two lines of the cache"
+        )
         product.add(v, found)
         assert np.abs(found - wanted).max() < 1e-12 * size
     other = np.zeros(len(x))

@@ -67,7 +67,7 @@ class _Line:
     """A line of a file, and where it stands, for messages."""
 
     text: str
-    place: str
+    location: str
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,12 @@ class _Keyword:
 
     name: str
     options: Mapping[str, str]
-    place: str
+    location: str
 
     def option(self, name: str) -> str:
         """A parameter that must be there."""
         if not self.options.get(name):
-            raise AbaqusError(f"{self.place}: *{self.name} needs {name}=")
+            raise AbaqusError(f"{self.location}: *{self.name} needs {name}=")
         return self.options[name]
 
 
@@ -93,7 +93,7 @@ class _Set:
     """
 
     name: str
-    place: str
+    location: str
     members: list[tuple[str, str, int | range | str]] = field(default_factory=list)
     internal: bool = True
 
@@ -103,7 +103,7 @@ class _Surface:
     """Lines of a surface: name or number of elements or nodes, and a label of faces."""
 
     name: str
-    place: str
+    location: str
     kind: str
     lines: list[tuple[str, str]] = field(default_factory=list)
     internal: bool = False
@@ -123,9 +123,9 @@ class _Scope:
     sets: dict[tuple[str, str], _Set] = field(default_factory=dict)
     surfaces: dict[str, _Surface] = field(default_factory=dict)
 
-    def set(self, kind: str, name: str, place: str) -> _Set:
+    def set(self, kind: str, name: str, location: str) -> _Set:
         """The set of a name, which is made where it is new."""
-        return self.sets.setdefault((kind, name.upper()), _Set(name, place))
+        return self.sets.setdefault((kind, name.upper()), _Set(name, location))
 
 
 # lines and keywords ---------------------------------------------------------------------------
@@ -145,7 +145,7 @@ def _lines(path: Path, base: Path, opened: tuple[Path, ...] = ()) -> Iterator[_L
             if text[0] in "+-.0123456789":
                 yield waiting
             else:
-                line = _Line(f"{waiting.text}{text}", waiting.place)
+                line = _Line(f"{waiting.text}{text}", waiting.location)
             waiting = None
         if line.text.startswith("*") and line.text.endswith(","):
             waiting = line
@@ -158,17 +158,17 @@ def _lines(path: Path, base: Path, opened: tuple[Path, ...] = ()) -> Iterator[_L
         if keyword.name != "INCLUDE":
             yield line
         if keyword.name in ("INCLUDE", "NODE", "ELEMENT") and (source or keyword.name == "INCLUDE"):
-            file = _file(keyword.option("INPUT"), (path.parent, base), line.place)
+            file = _file(keyword.option("INPUT"), (path.parent, base), line.location)
             yield from _lines(file, base, (*opened, path.resolve()))
     if waiting is not None:
         yield waiting
 
 
-def _file(name: str, folders: Iterable[Path], place: str) -> Path:
+def _file(name: str, folders: Iterable[Path], location: str) -> Path:
     for folder in folders:
         if (folder / name).is_file():
             return folder / name
-    raise AbaqusError(f"{place}: there is no file {name!r} to include")
+    raise AbaqusError(f"{location}: there is no file {name!r} to include")
 
 
 def _fields(text: str) -> list[str]:
@@ -189,7 +189,7 @@ def _keyword(line: _Line) -> _Keyword:
     for part in option_texts:
         key, _, value = part.partition("=")
         options["".join(key.split()).upper()] = value.strip().strip('"')
-    return _Keyword("".join(name.split()).upper(), options, line.place)
+    return _Keyword("".join(name.split()).upper(), options, line.location)
 
 
 def _blocks(lines: Iterable[_Line]) -> Iterator[tuple[_Keyword, list[_Line]]]:
@@ -207,18 +207,18 @@ def _blocks(lines: Iterable[_Line]) -> Iterator[tuple[_Keyword, list[_Line]]]:
         yield keyword, data
 
 
-def _real(text: str, place: str) -> float:
+def _real(text: str, location: str) -> float:
     try:
         return float(text.upper().replace("D", "E")) if text else 0.0
     except ValueError:
-        raise AbaqusError(f"{place}: {text!r} is no number") from None
+        raise AbaqusError(f"{location}: {text!r} is no number") from None
 
 
-def _whole(text: str, place: str) -> int:
+def _integer(text: str, location: str) -> int:
     try:
         return int(text)
     except ValueError:
-        raise AbaqusError(f"{place}: {text!r} is no whole number") from None
+        raise AbaqusError(f"{location}: {text!r} is no whole number") from None
 
 
 # the model ------------------------------------------------------------------------------------
@@ -244,7 +244,7 @@ class _Model:
         """Take up a keyword with its lines of data."""
         if keyword.name in _GENERATORS:
             raise AbaqusError(
-                f"{keyword.place}: *{keyword.name} makes {_GENERATORS[keyword.name]} by a rule, "
+                f"{keyword.location}: *{keyword.name} makes {_GENERATORS[keyword.name]} by a rule, "
                 f"which is not read: {_ADVICE}"
             )
         read = _READERS.get(keyword.name)
@@ -255,16 +255,16 @@ class _Model:
         """*NODE."""
         if keyword.options.get("SYSTEM", "R").upper() != "R":
             raise AbaqusError(
-                f"{keyword.place}: *NODE, SYSTEM={keyword.options['SYSTEM']} is not read: {_ADVICE}"
-                ", in x, y, z"
+                f"{keyword.location}: *NODE, SYSTEM={keyword.options['SYSTEM']} is not read: "
+                f"{_ADVICE}, in x, y, z"
             )
         existing, labels = self.current.nodes, []
         for line in data:
             first, *coordinates = _fields(line.text)
-            label = _whole(first, line.place)
-            x, y, z = ([_real(text, line.place) for text in coordinates[:3]] + [0.0] * 3)[:3]
+            label = _integer(first, line.location)
+            x, y, z = ([_real(text, line.location) for text in coordinates[:3]] + [0.0] * 3)[:3]
             if existing.setdefault(label, (x, y, z)) != (x, y, z):
-                raise AbaqusError(f"{line.place}: node {label} is given again, at another place")
+                raise AbaqusError(f"{line.location}: node {label} is given again, at another place")
             labels.append(label)
         self._add("NSET", keyword, labels)
 
@@ -276,23 +276,25 @@ class _Model:
         count, existing, labels = len(CELLS[kind].nodes), self.current.elements, []
         numbers: list[int] = []
         for line in data:
-            numbers += [_whole(text, line.place) for text in _fields(line.text)]
+            numbers += [_integer(text, line.location) for text in _fields(line.text)]
             if len(numbers) <= count:
                 continue
             label, nodes = numbers[0], tuple(numbers[1 : count + 1])
             if len(numbers) > count + 1 and family != "line":  # a beam may have a node beside it
                 raise AbaqusError(
-                    f"{line.place}: element {label} has {len(numbers) - 1} nodes, "
+                    f"{line.location}: element {label} has {len(numbers) - 1} nodes, "
                     f"{keyword.options['TYPE']} has {count}"
                 )
             nodes = tuple(nodes[k] for k in CELLS[kind].abaqus_nodes or range(count))
             if existing.setdefault(label, (kind, family, nodes)) != (kind, family, nodes):
-                raise AbaqusError(f"{line.place}: element {label} is given again, as another one")
+                raise AbaqusError(
+                    f"{line.location}: element {label} is given again, as another one"
+                )
             labels.append(label)
             numbers = []
         if numbers:
             raise AbaqusError(
-                f"{data[-1].place}: element {numbers[0]} has {len(numbers) - 1} nodes, "
+                f"{data[-1].location}: element {numbers[0]} has {len(numbers) - 1} nodes, "
                 f"{keyword.options['TYPE']} has {count}"
             )
         self._add("ELSET", keyword, labels)
@@ -300,14 +302,14 @@ class _Model:
     def _add(self, kind: str, keyword: _Keyword, labels: Iterable[int]) -> None:
         """Put new nodes or elements into the set that their keyword names."""
         if keyword.options.get(kind):
-            group = self.current.set(kind, keyword.options[kind], keyword.place)
+            group = self.current.set(kind, keyword.options[kind], keyword.location)
             group.members += [("", kind, label) for label in labels]
             group.internal = False
 
     def sets(self, keyword: _Keyword, data: list[_Line]) -> None:
         """*NSET and *ELSET."""
         options, kind = keyword.options, keyword.name
-        group = self.current.set(kind, keyword.option(kind), keyword.place)
+        group = self.current.set(kind, keyword.option(kind), keyword.location)
         group.internal &= "INTERNAL" in options
         instance = options.get("INSTANCE", "")
         if kind == "NSET" and options.get("ELSET"):
@@ -315,12 +317,12 @@ class _Model:
         for line in data:
             fields = _fields(line.text)
             if "GENERATE" in options:
-                numbers = [_whole(text, line.place) for text in fields]
+                numbers = [_integer(text, line.location) for text in fields]
                 first = numbers[0]
                 last, step = [*numbers[1:], *(first, 1)[len(numbers) - 1 :]][:2]
                 if step < 1:
                     raise AbaqusError(
-                        f"{line.place}: GENERATE in steps of {step}, must be 1 or more"
+                        f"{line.location}: GENERATE in steps of {step}, must be 1 or more"
                     )
                 group.members.append((instance, kind, range(first, last + 1, step)))
             else:
@@ -338,13 +340,13 @@ class _Model:
             kind = keyword.options["COMBINE"].upper()
         if kind not in ("ELEMENT", "NODE", "UNION"):
             warn(
-                f"{keyword.place}: the surface {name!r} is left out, {kind} is not read: faces of "
-                "elements and nodes are",
+                f"{keyword.location}: the surface {name!r} is left out, {kind} is not read: faces "
+                "of elements and nodes are",
                 stacklevel=2,
             )
             return
         target = self.current.surfaces.setdefault(
-            name.upper(), _Surface(name, keyword.place, kind, [], "INTERNAL" in keyword.options)
+            name.upper(), _Surface(name, keyword.location, kind, [], "INTERNAL" in keyword.options)
         )
         for line in data:
             fields = _fields(line.text)
@@ -363,15 +365,15 @@ class _Model:
         """*INSTANCE: a part that is moved and turned."""
         name, part = keyword.option("NAME"), keyword.option("PART")
         if part.upper() not in self.parts:
-            raise AbaqusError(f"{keyword.place}: there is no part {part!r}")
+            raise AbaqusError(f"{keyword.location}: there is no part {part!r}")
         source = self.parts[part.upper()]
-        numbers = [[_real(text, line.place) for text in _fields(line.text)] for line in data]
-        moved = _moved(source.nodes, numbers, keyword.place)
+        numbers = [[_real(text, line.location) for text in _fields(line.text)] for line in data]
+        moved = _moved(source.nodes, numbers, keyword.location)
         sets = {
-            k: _Set(s.name, s.place, list(s.members), s.internal) for k, s in source.sets.items()
+            k: _Set(s.name, s.location, list(s.members), s.internal) for k, s in source.sets.items()
         }
         surfaces = {
-            k: _Surface(s.name, s.place, s.kind, list(s.lines), s.internal)
+            k: _Surface(s.name, s.location, s.kind, list(s.lines), s.internal)
             for k, s in source.surfaces.items()
         }
         self.current = _Scope(name, moved, dict(source.elements), sets, surfaces)
@@ -406,13 +408,13 @@ def _kind(keyword: _Keyword) -> tuple[str, str]:
             return family, kinds[int(match[1])]
     allowed = ", ".join(_TYPES[3][k] for k in _SOLIDS.values())
     raise AbaqusError(
-        f"{keyword.place}: elements {name} have no cell here; there are {allowed}, CPS3/4/6/8 and "
-        "CPE, CAX, S, M3D likewise, T3D2/3, B31/32 and their variants"
+        f"{keyword.location}: elements {name} have no cell here; there are {allowed}, CPS3/4/6/8 "
+        "and CPE, CAX, S, M3D likewise, T3D2/3, B31/32 and their variants"
     )
 
 
 def _moved(
-    nodes: Mapping[int, tuple[float, float, float]], data: Sequence[Sequence[float]], place: str
+    nodes: Mapping[int, tuple[float, float, float]], data: Sequence[Sequence[float]], location: str
 ) -> dict[int, tuple[float, float, float]]:
     """Nodes of an instance: first shifted, then turned about an axis through two points."""
     if not data or not nodes:
@@ -420,7 +422,7 @@ def _moved(
     points = np.array(list(nodes.values())) + np.pad(data[0][:3], (0, 3 - len(data[0][:3])))
     if len(data) > 1:
         if len(data[1]) != 7:
-            raise AbaqusError(f"{place}: a rotation has two points and an angle, 7 numbers")
+            raise AbaqusError(f"{location}: a rotation has two points and an angle, 7 numbers")
         a, b, angle = np.array(data[1][:3]), np.array(data[1][3:6]), math.radians(data[1][6])
         n = (b - a) / np.linalg.norm(b - a)
         r = points - a
@@ -524,7 +526,7 @@ class _Mesh:
             for name, _ in surface.lines:
                 other = self.scopes[key].surfaces.get(name.upper())
                 if other is None or other is surface:
-                    raise AbaqusError(f"{surface.place}: there is no surface {name!r}")
+                    raise AbaqusError(f"{surface.location}: there is no surface {name!r}")
                 for kind, faces in self.side(key, other).items():
                     found.setdefault(kind, []).extend(faces)
             return found
@@ -553,7 +555,7 @@ class _Mesh:
             return [f for f in faces if tuple(sorted(f[1])) in self.outside(f[0])]
         number = _face_number(family, label)
         if number is None or number > len(CELLS[kind].side_nodes):
-            raise AbaqusError(f"{surface.place}: a {kind} has no face {label!r}")
+            raise AbaqusError(f"{surface.location}: a {kind} has no face {label!r}")
         if number > 0:
             face, local = CELLS[kind].side_nodes[number - 1]
             return [(face.name, tuple(nodes[k] for k in local))]
@@ -728,9 +730,9 @@ def _rows(numbers: Sequence[int]) -> list[str]:
     return [", ".join(map(str, part)) + "," * (part is not parts[-1]) for part in parts]
 
 
-def _quoted(name: str, kind: str, known: dict[tuple[str, str], str]) -> str:
+def _quoted(name: str, kind: str, existing: dict[tuple[str, str], str]) -> str:
     """A name as it is written; Abaqus does not tell capitals from small letters."""
-    other = known.setdefault((kind, name.upper()), name)
+    other = existing.setdefault((kind, name.upper()), name)
     if other != name:
         raise AbaqusError(f"{other!r} and {name!r} are one name in a file of Abaqus")
     if any(letter in name for letter in '"\n\r'):

@@ -63,13 +63,13 @@ class _Source:
         """The next numbers."""
         return np.asarray(self._next("f8", count), dtype=np.float64)
 
-    def whole(self, kind: str, count: int) -> Integers:
+    def integers(self, kind: str, count: int) -> Integers:
         """The next whole numbers, of kind "i4" or "u8" in a binary file."""
         return np.asarray(self._next(kind, count)).astype(np.int64)
 
     def one(self, kind: str) -> int:
         """The next whole number."""
-        return int(self.whole(kind, 1)[0])
+        return int(self.integers(kind, 1)[0])
 
     def _next(self, kind: str, count: int) -> Any:
         if self.binary:
@@ -159,7 +159,7 @@ def _parametric_2(source: _Source, parts: _Parts, version: str) -> None:
     for _ in range(count):
         tags.append(source.one("i4"))
         points.append(source.reals(3))
-        dimension = int(source.whole("i4", 2)[0])
+        dimension = int(source.integers("i4", 2)[0])
         source.reals(dimension if dimension < 3 else 0)
     parts.tags.append(np.array(tags, dtype=np.int64))
     parts.points.append(np.array(points).reshape(-1, 3))
@@ -169,13 +169,13 @@ def _cells_2(source: _Source, parts: _Parts, version: str) -> None:
     left = int(source.line()) if source.binary else source.one("u8")
     while left > 0:
         if source.binary:
-            number, count, tags = source.whole("i4", 3).tolist()
+            number, count, tags = source.integers("i4", 3).tolist()
         else:
-            _, number, tags = source.whole("i4", 3).tolist()
+            _, number, tags = source.integers("i4", 3).tolist()
             count = 1
         kind = _kind(number)
         width = tags + len(CELLS[kind].nodes) + int(source.binary)  # the cell's own number is first
-        table = source.whole("i4", count * width).reshape(count, width)[:, int(source.binary) :]
+        table = source.integers("i4", count * width).reshape(count, width)[:, int(source.binary) :]
         for group in np.unique(table[:, 0]) if tags else (0,):
             rows = table[:, 0] == group if tags else slice(None)
             groups = [(CELLS[kind].dimension, abs(int(group)))] if group else []
@@ -184,55 +184,55 @@ def _cells_2(source: _Source, parts: _Parts, version: str) -> None:
 
 
 def _entities_4(source: _Source, parts: _Parts, version: str) -> None:
-    for dimension, count in enumerate(source.whole("u8", 4).tolist()):
+    for dimension, count in enumerate(source.integers("u8", 4).tolist()):
         for _ in range(count):
             tag = source.one("i4")
             source.reals(3 if dimension == 0 and version == "4.1" else 6)  # its box
-            groups = source.whole("i4", source.one("u8")).tolist()
+            groups = source.integers("i4", source.one("u8")).tolist()
             # the sign of a group tells the direction of an entity
             parts.entities[dimension, tag] = [(dimension, abs(group)) for group in groups]
             if dimension:
-                source.whole("i4", source.one("u8"))  # what bounds it
+                source.integers("i4", source.one("u8"))  # what bounds it
 
 
 def _partitions_4(source: _Source, parts: _Parts, version: str) -> None:
     """Entities of a mesh in partitions, with the groups of what they are parts of."""
     source.one("u8")
-    source.whole("i4", 2 * source.one("u8"))  # ghosts
-    for dimension, count in enumerate(source.whole("u8", 4).tolist()):
+    source.integers("i4", 2 * source.one("u8"))  # ghosts
+    for dimension, count in enumerate(source.integers("u8", 4).tolist()):
         for _ in range(count):
-            tag = int(source.whole("i4", 3)[0])
-            source.whole("i4", source.one("u8"))  # its partitions
+            tag = int(source.integers("i4", 3)[0])
+            source.integers("i4", source.one("u8"))  # its partitions
             source.reals(6 if dimension else 3)
-            groups = source.whole("i4", source.one("u8")).tolist()
+            groups = source.integers("i4", source.one("u8")).tolist()
             parts.entities[dimension, tag] = [(dimension, abs(group)) for group in groups]
             if dimension:
-                source.whole("i4", source.one("u8"))
+                source.integers("i4", source.one("u8"))
 
 
 def _nodes_4(source: _Source, parts: _Parts, version: str) -> None:
     if version != "4.1":
-        for _ in range(int(source.whole("u8", 2)[0])):
-            _, dimension, parametric = source.whole("i4", 3).tolist()
+        for _ in range(int(source.integers("u8", 2)[0])):
+            _, dimension, parametric = source.integers("i4", 3).tolist()
             width = 4 + (dimension if parametric else 0)
             lines = source.reals(width * (count := source.one("u8"))).reshape(count, width)
             parts.tags.append(lines[:, 0].astype(np.int64))
             parts.points.append(lines[:, 1:4])
         return
-    for _ in range(int(source.whole("u8", 4)[0])):
-        dimension, _, parametric = source.whole("i4", 3).tolist()
+    for _ in range(int(source.integers("u8", 4)[0])):
+        dimension, _, parametric = source.integers("i4", 3).tolist()
         count, width = source.one("u8"), 3 + (dimension if parametric else 0)
-        parts.tags.append(source.whole("u8", count))
+        parts.tags.append(source.integers("u8", count))
         parts.points.append(source.reals(count * width).reshape(count, width)[:, :3])
 
 
 def _cells_4(source: _Source, parts: _Parts, version: str) -> None:
-    for _ in range(int(source.whole("u8", 4 if version == "4.1" else 2)[0])):
-        first, second, number = source.whole("i4", 3).tolist()
+    for _ in range(int(source.integers("u8", 4 if version == "4.1" else 2)[0])):
+        first, second, number = source.integers("i4", 3).tolist()
         entity = (first, second) if version == "4.1" else (second, first)
         kind, count = _kind(number), source.one("u8")
         width = 1 + len(CELLS[kind].nodes)
-        rows = source.whole("u8", count * width).reshape(count, width)[:, 1:]
+        rows = source.integers("u8", count * width).reshape(count, width)[:, 1:]
         parts.add(kind, rows, parts.entities.get(entity, []))
 
 
@@ -255,16 +255,16 @@ def _kind(number: int) -> str:
     return _KINDS[number]
 
 
-def _content(found: _Parts) -> Content:
+def _content(file_parts: _Parts) -> Content:
     """Nodes by their places in the list, each cell once."""
-    if not found.points or not found.rows:
+    if not file_parts.points or not file_parts.rows:
         raise GmshError("there are no nodes or no cells")
-    tags = np.concatenate(found.tags)
+    tags = np.concatenate(file_parts.tags)
     index_of_tag = np.full(int(tags.max()) + 1, -1)
     index_of_tag[tags] = np.arange(len(tags))
     cells: dict[str, Integers] = {}
-    names: dict[str, dict[str, Integers]] = {name: {} for name in found.names.values()}
-    for kind, parts in found.rows.items():
+    names: dict[str, dict[str, Integers]] = {name: {} for name in file_parts.names.values()}
+    for kind, parts in file_parts.rows.items():
         rows = index_of_tag[np.concatenate(parts)]
         if rows.min() < 0:
             raise GmshError(f"a {kind} has a node that is not in the file")
@@ -272,13 +272,13 @@ def _content(found: _Parts) -> Content:
         cells[kind] = rows[first][:, list(CELLS[kind].gmsh_nodes or range(rows.shape[1]))]
         bounds = np.cumsum([len(part) for part in parts])[:-1]
         members: dict[str, list[Integers]] = {}
-        for numbers, groups in zip(np.split(number, bounds), found.groups[kind], strict=True):
-            for name in {found.names[group] for group in groups if group in found.names}:
+        for numbers, groups in zip(np.split(number, bounds), file_parts.groups[kind], strict=True):
+            for name in {file_parts.names[group] for group in groups if group in file_parts.names}:
                 members.setdefault(name, []).append(numbers)
         for name, lists in members.items():
             names[name][kind] = np.unique(np.concatenate(lists))
     nonempty = {name: members for name, members in names.items() if members}
-    return Content(np.concatenate(found.points), cells, nonempty, tags)
+    return Content(np.concatenate(file_parts.points), cells, nonempty, tags)
 
 
 def text(

@@ -139,16 +139,16 @@ def write_parts(mesh: Mesh, path: Path, count: int) -> None:
         raise MeshError(f"write(parts=...): side {lost[0]!r} has faces of no cell")
 
 
-def _cut(centres: Array, chosen: Integers, parts: range, part: Integers) -> None:
+def _cut(centres: Array, cell_numbers: Integers, parts: range, part: Integers) -> None:
     """Cut cells across their longest extent until there is one part each."""
     if len(parts) == 1:
-        part[chosen] = parts[0]
+        part[cell_numbers] = parts[0]
         return
-    centres_here, half = centres[chosen], len(parts) // 2
-    order = chosen[
+    centres_here, half = centres[cell_numbers], len(parts) // 2
+    order = cell_numbers[
         np.argsort(centres_here[:, np.ptp(centres_here, axis=0).argmax()], kind="stable")
     ]
-    first = len(chosen) * half // len(parts)
+    first = len(cell_numbers) * half // len(parts)
     _cut(centres, order[:first], parts[:half], part)
     _cut(centres, order[first:], parts[half:], part)
 
@@ -159,7 +159,7 @@ class _Chosen:
 
     rows: Mapping[str, Integers]
     used: Integers
-    place: Integers
+    position: Integers
 
     @classmethod
     def of(cls, mesh: Mesh, rows: Mapping[str, Integers]) -> _Chosen:
@@ -174,7 +174,7 @@ class _Chosen:
         faces: dict[str, list[Integers]] = {}
         for kind, rows in self.rows.items():
             nodes = mesh.cells[kind][rows]
-            result[f"cells:{kind}"] = self.place[nodes]
+            result[f"cells:{kind}"] = self.position[nodes]
             for face, local in CELLS[kind].side_nodes:
                 faces.setdefault(face.name, []).append(nodes[:, list(local)])
         for name, group in mesh.groups.items():
@@ -187,7 +187,7 @@ class _Chosen:
                     cell_faces = np.concatenate(faces[kind])
                     belongs = match_faces(side_faces, cell_faces, CELLS[kind].corners) >= 0
                 else:  # points or edges: in the first part that has them
-                    belongs = np.asarray((self.place[side_faces] >= 0).all(axis=1))
-                result[f"side:{kind}:{name}"] = self.place[side_faces[belongs]]
+                    belongs = np.asarray((self.position[side_faces] >= 0).all(axis=1))
+                result[f"side:{kind}:{name}"] = self.position[side_faces[belongs]]
                 side[kind] = side_faces[~belongs]
         return result

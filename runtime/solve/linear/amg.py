@@ -156,9 +156,9 @@ class GridHierarchy:
     _of: Any = field(default=None, init=False)
     _first_iterations: int = field(default=0, init=False)
 
-    def fits(self, held: Flags) -> bool:
+    def fits(self, prescribed: Flags) -> bool:
         """True if a matrix with these unknowns prescribed may use them."""
-        return not self.stale and np.array_equal(held, self.prescribed)
+        return not self.stale and np.array_equal(prescribed, self.prescribed)
 
     def of(self, A: Any) -> Any:
         """The hierarchy, made of A if there is none."""

@@ -83,14 +83,16 @@ class SuperLU:
     def _order(self, K: SparseMatrix) -> EliminationOrder:
         """The order of the pattern of K, (n, n)."""
         cached = self.orders.find(K)
-        return cached or self.orders.add(EliminationOrder.of(K, self._found(K)))
+        return cached or self.orders.add(EliminationOrder.of(K, self._column_order(K)))
 
     def _last(self, K: SparseMatrix, boundary: Integers) -> EliminationOrder:
         """The order of the pattern of K, (n, n), with the boundary (m,) last."""
         cached = self.orders.find(K)
-        return EliminationOrder.of(K, cached.unknowns if cached else self._found(K), boundary)
+        return EliminationOrder.of(
+            K, cached.unknowns if cached else self._column_order(K), boundary
+        )
 
-    def _found(self, K: SparseMatrix) -> Integers:
+    def _column_order(self, K: SparseMatrix) -> Integers:
         """All unknowns (n,) as they are eliminated: an incomplete factorisation costs least."""
         pattern = K.copy()
         pattern.data[:] = 0.0
