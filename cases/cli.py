@@ -22,16 +22,16 @@ _NAMES = ", ".join(SHIPPED)
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
 
-def _into(words: str) -> Callable[[_Command], _Command]:
+def _into(help_text: str) -> Callable[[_Command], _Command]:
     """The folder that a command writes to; None if it is left out."""
     kind = click.Path(path_type=Path)
-    return click.option("--out", "folder", metavar="DIR", type=kind, help=words)
+    return click.option("--out", "folder", metavar="DIR", type=kind, help=help_text)
 
 
-def _jobs(words: str) -> Callable[[_Command], _Command]:
+def _jobs(help_text: str) -> Callable[[_Command], _Command]:
     """The number of processes."""
     kind = click.IntRange(min=1)
-    return click.option("--jobs", metavar="N", type=kind, default=1, help=words)
+    return click.option("--jobs", metavar="N", type=kind, default=1, help=help_text)
 
 
 @click.command(
@@ -277,8 +277,8 @@ def _write(
     except OSError as error:
         raise BadInput(f"cannot write {path}: {error.strerror or error}") from None
     if not quiet:
-        told = f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.0f} kB"
-        click.echo(f"written to {path} ({told})")
+        size_text = f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.0f} kB"
+        click.echo(f"written to {path} ({size_text})")
 
 
 @contextmanager
@@ -310,10 +310,10 @@ def _by_petsc(case: str) -> str:
     """Settings of a case by which PETSc solves its linear systems.  Raises BadInput."""
     from softehl.cases.harness.case_file import find_case
 
-    found = find_case(case, SHIPPED)[0]
-    if "linear" not in found.parameters.model_fields:
+    named_case = find_case(case, SHIPPED)[0]
+    if "linear" not in named_case.parameters.model_fields:
         raise BadInput(
-            f"--engine petsc: {found.name} has no linear systems worth several processes; "
+            f"--engine petsc: {named_case.name} has no linear systems worth several processes; "
             "allowed: --engine serial"
         )
     return "linear=petsc"
@@ -345,7 +345,7 @@ def keys(case: str) -> int:
     context_settings={"ignore_unknown_options": True},  # a target that begins with a minus sign
 )
 @click.argument("case", metavar="CASE")
-@click.argument("words", metavar="TARGET", nargs=-1, required=True)
+@click.argument("target", metavar="TARGET", nargs=-1, required=True)
 @click.option("--by", "key", metavar="KEY", required=True, help="The key to change.")
 @click.option(
     "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="As in `softehl run`."
@@ -358,14 +358,14 @@ def keys(case: str) -> int:
     help="Also write a page: curve of the design; results, gland and section before and after.",
 )
 def design(
-    case: str, words: tuple[str, ...], key: str, assignments: tuple[str, ...], page: Path | None
+    case: str, target: tuple[str, ...], key: str, assignments: tuple[str, ...], page: Path | None
 ) -> int:
     """Find the value of a key."""
     from softehl.cases.harness.case_file import read_case
     from softehl.cases.harness.progress import make_display
     from softehl.cases.harness.runner import Teller
     from softehl.cases.seal.gland.parameters import Seal
-    from softehl.cases.seal.sensitivity.design import design_case, told
+    from softehl.cases.seal.sensitivity.design import design_case, design_lines
     from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 
     read = read_case(case, SHIPPED, assignments)
@@ -376,8 +376,10 @@ def design(
         if not page.parent.is_dir():
             raise BadInput(f"--report {str(page)!r}: there is no folder {str(page.parent)!r}")
     with make_display(read.case.foreword(read.parameters), quiet=False) as display:
-        found = design_case(read.parameters, " ".join(words), key, ObserverAdapter(Teller(display)))
-    for line in told(found):
+        found = design_case(
+            read.parameters, " ".join(target), key, ObserverAdapter(Teller(display))
+        )
+    for line in design_lines(found):
         click.echo(line)
     if page is not None:
         from softehl.cases.seal.report.design import design_parts, design_title

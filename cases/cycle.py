@@ -72,9 +72,9 @@ class Cycle(Seal):
     time_tolerance: float = key(0.02, "error of h in a step, relative to it", gt=0, le=0.5)
 
     @classmethod
-    def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def completed(cls, values: dict[str, Any]) -> dict[str, Any]:
         """As for the O-ring, and motion by words or from a file.  ValueError."""
-        return super().completed(motion_keys(given))
+        return super().completed(motion_keys(values))
 
     @model_validator(mode="after")
     def _moves(self) -> Self:
@@ -119,12 +119,12 @@ _WITHOUT_TABLE = ("travel", "frequency", "shape", "ramp")
 def unused(p: Cycle) -> list[str]:
     """Which of these were given, in words."""
     fields = type(p).model_fields
-    given = [key for key in fields if getattr(p, key) != fields[key].default]
-    steady = [key for key in _OF_STEADY_FILMS if key in given]
-    beside = [key for key in _WITHOUT_TABLE if key in given and p.motion]
+    set_keys = [key for key in fields if getattr(p, key) != fields[key].default]
+    steady = [key for key in _OF_STEADY_FILMS if key in set_keys]
+    table_keys = [key for key in _WITHOUT_TABLE if key in set_keys and p.motion]
     return [
         *(f"{key} has no effect on a cycle, only on steady films" for key in steady),
-        *(f"{key} has no effect beside a motion of its own" for key in beside),
+        *(f"{key} has no effect beside a motion of its own" for key in table_keys),
     ]
 
 
@@ -137,31 +137,41 @@ class CycleRow(Row):
     """A row of curve.csv: one cycle."""
 
     files = ("loop_{}.csv", "film_{}.csv", "state_{}.csv", "section_{}.csv")
-    cycle: float = column("", "number of the cycle", head="cycle", shown="g")
-    leak_mm3: float = column("mm3", "oil past the air end, + = out", head="leak", shown=".4g")
+    cycle: float = column("", "number of the cycle", head="cycle", number_format="g")
+    leak_mm3: float = column(
+        "mm3", "oil past the air end, + = out", head="leak", number_format=".4g"
+    )
     leak_sealed_mm3: float = column("mm3", "oil past the sealed end, + = to the air side")
-    friction_out_N: float = column("N", "largest friction", head="friction", shown=".4g")
-    friction_in_N: float = column("N", "least friction", head="friction", shown=".4g")
-    energy_mJ: float = column("mJ", "work of friction on the rod", head="energy", shown=".4g")
-    h_min_um: float = column("um", "least film thickness at a node", head="h min", shown=".4g")
+    friction_out_N: float = column("N", "largest friction", head="friction", number_format=".4g")
+    friction_in_N: float = column("N", "least friction", head="friction", number_format=".4g")
+    energy_mJ: float = column(
+        "mJ", "work of friction on the rod", head="energy", number_format=".4g"
+    )
+    h_min_um: float = column(
+        "um", "least film thickness at a node", head="h min", number_format=".4g"
+    )
     p_max_MPa: float = column("MPa", "largest film pressure")
     asperity_load_percent: float = column("%", "largest share of asperities in the load")
     change_percent: float = column(
         "%",
         "change of energy and leaks against the cycle before",
         head="change",
-        shown=".2g",
+        number_format=".2g",
         default=nan,
     )
     breakaway_N: float = column(
         "N",
         f"breakaway friction: the largest while the rod is slower than {BREAKAWAY:.0%} of its most",
         head="breakaway",
-        shown=".4g",
+        number_format=".4g",
         default=nan,
     )
     lambda_ratio: float = column(
-        "", "least mean gap of the film over the roughness", head="lambda", shown=".2g", default=nan
+        "",
+        "least mean gap of the film over the roughness",
+        head="lambda",
+        number_format=".2g",
+        default=nan,
     )
     mass_error: float = column(
         "", "largest error of the balance of oil, relative to the oil in the film"
@@ -176,23 +186,23 @@ class CycleRow(Row):
         return (self.cycle,)
 
 
-def cycle_row(number: int, radius: float, films: Any, before: Any, last: Any) -> CycleRow:
+def cycle_row(number: int, radius: float, films: Any, start: Any, last: Any) -> CycleRow:
     """A cycle in numbers; films: what happened in it, see `cases.seal.cycle.cycle_driver.Films`.
 
-    before: the reading at its start, last: the row before it or None.
+    start: the reading at its start, last: the row before it or None.
     """
-    all_of_them, around = [before, *films.readings], 2.0 * pi * radius
+    all_of_them, around = [start, *films.readings], 2.0 * pi * radius
     t, U, F = (
         np.array([getattr(r, name) for r in all_of_them])
         for name in ("t_s", "rod_speed_mm_s", "friction_N")
     )
     end, names = all_of_them[-1], ("content_mm2", "volume_air_mm2", "volume_sealed_mm2")
-    held, out, came = (np.array([getattr(r, n) for r in all_of_them]) for n in names)
-    balance = held + out - came
+    content, out, came = (np.array([getattr(r, n) for r in all_of_them]) for n in names)
+    balance = content + out - came
     row = CycleRow(
         cycle=float(number),
-        leak_mm3=around * (end.volume_air_mm2 - before.volume_air_mm2),
-        leak_sealed_mm3=around * (end.volume_sealed_mm2 - before.volume_sealed_mm2),
+        leak_mm3=around * (end.volume_air_mm2 - start.volume_air_mm2),
+        leak_sealed_mm3=around * (end.volume_sealed_mm2 - start.volume_sealed_mm2),
         friction_out_N=float(F.max()),
         friction_in_N=float(F.min()),
         energy_mJ=float(trapezoid(F * U, t)),
@@ -201,14 +211,14 @@ def cycle_row(number: int, radius: float, films: Any, before: Any, last: Any) ->
         asperity_load_percent=max(r.asperity_load_percent for r in films.readings),
         breakaway_N=float(np.abs(F[np.abs(U) <= BREAKAWAY * np.abs(U).max()]).max(initial=0.0)),
         lambda_ratio=min(r.lambda_ratio for r in films.readings),
-        mass_error=float(np.ptp(balance) / before.content_mm2),
+        mass_error=float(np.ptp(balance) / start.content_mm2),
         steps=len(films.readings),
         newton_iterations=sum(r.iterations for r in films.readings),
         verdict=TRANSIENT,
     )
     if last is None:
         return row
-    through = max(abs(row.leak_mm3), 1e-3 * around * before.content_mm2)
+    through = max(abs(row.leak_mm3), 1e-3 * around * start.content_mm2)
     leak = abs(row.leak_mm3 - last.leak_mm3) / through
     change = 100.0 * max(leak, abs(row.energy_mJ / last.energy_mJ - 1.0))
     return replace(row, change_percent=change, verdict=OK if change < PERIODIC else TRANSIENT)
@@ -231,25 +241,25 @@ class CycleCase(Case[Cycle, CycleRow]):
     selection = ("cycles", "animation")
     files = (*(f"{n}.{k}" for n in ("rows", *PICTURES) for k in KINDS), ANIMATION)
 
-    left_out = tuple(words for words in LEFT_OUT if not words.startswith("Time"))
+    left_out = tuple(limit for limit in LEFT_OUT if not limit.startswith("Time"))
 
-    def assumed(self, parameters: Cycle, given: Collection[str]) -> list[str]:
+    def assumed(self, parameters: Cycle, set_keys: Collection[str]) -> list[str]:
         """See :class:`Case`."""
-        return assumed(parameters, given)
+        return assumed(parameters, set_keys)
 
     def warnings(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""
         highest = parameters.path.pressure.largest
-        words = [*warnings(parameters, highest), *unused(parameters), *parameters.path.defects()]
+        messages = [*warnings(parameters, highest), *unused(parameters), *parameters.path.defects()]
         if parameters.rough:
-            return words
+            return messages
         return [
-            *words,
+            *messages,
             "between smooth surfaces a reversal squeezes the film to nanometres; give a roughness "
             "(rms of the seal in um, 0.2 to 0.4 is usual)",
         ]
 
-    def answer(self, parameters: Cycle, rows: Sequence[CycleRow]) -> list[str]:
+    def summary(self, parameters: Cycle, rows: Sequence[CycleRow]) -> list[str]:
         """See :class:`Case`: the last cycle."""
         if not rows:
             return []
@@ -307,8 +317,8 @@ class CycleCase(Case[Cycle, CycleRow]):
         """See :class:`Case`."""
         from softehl.cases.seal.cycle.cycle_driver import run_cycles
 
-        def log(number: int, films: Any, before: Any, last: Any) -> CycleRow:
-            row = cycle_row(number, 0.5 * abs(parameters.rod_diameter), films, before, last)
+        def log(number: int, films: Any, start: Any, last: Any) -> CycleRow:
+            row = cycle_row(number, 0.5 * abs(parameters.rod_diameter), films, start, last)
             observer.state(State(row, cycle_tables(films)))
             return row
 
@@ -333,8 +343,8 @@ class CycleCase(Case[Cycle, CycleRow]):
         from softehl.cases.seal.report.style import drawing
 
         loops = {row.label(row.key): read_table(folder / row.file_names()[0]) for row in rows}
-        shown = ("place_mm", "friction_N", "flux_air_mm2_s")
-        draw_columns(folder / "rows", loops, shown, kinds)
+        columns = ("place_mm", "friction_N", "flux_air_mm2_s")
+        draw_columns(folder / "rows", loops, columns, kinds)
         names, last = rows[-1].file_names(), [*loops.values()][-1]
         film, outline = (read_table(folder / names[k]) for k in (1, 3))
         with drawing():

@@ -35,13 +35,13 @@ def renewed(text: str) -> str:
     return _TABLE.sub(_table, text)
 
 
-def _table(found: re.Match[str]) -> str:
-    what, name, beyond, other = found.groups()
+def _table(match: re.Match[str]) -> str:
+    what, name, beyond, other = match.groups()
     if what == "section":
         lines = section_lines(name)
     elif what == "keys":
-        known = tuple(keys_of(load_case(SHIPPED[other]).parameters)) if other else ()
-        lines = key_lines(load_case(SHIPPED[name]).parameters, known)
+        excluded = tuple(keys_of(load_case(SHIPPED[other]).parameters)) if other else ()
+        lines = key_lines(load_case(SHIPPED[name]).parameters, excluded)
     else:
         lines = column_lines(TABLES.get(name) or load_case(SHIPPED[name]).row)
     return "\n".join([f"<!-- {what} {name}{beyond or ''} -->", *lines, "<!-- end -->"])
@@ -51,8 +51,8 @@ def section_lines(name: str) -> list[str]:
     """The dimensions of a section as a table."""
     rows = ["| key | left out | bounds [mm] | what it is |", "|---|---|---|---|"]
     fields = SECTIONS[name].model_fields
-    for key, own in dimensions(name).items():
-        extra = declared(fields[own])
+    for key, field_name in dimensions(name).items():
+        extra = declared(fields[field_name])
         bounds = extra["bounds"].partition(";")[0]
         share = f"{extra['part']:g} section_diameter"
         rows.append(f"| `{key}` | {share} | {bounds} | {extra['meaning']} |")

@@ -20,7 +20,7 @@ from softehl.cases.seal.states.sensitivity_table import differentiable, resolved
 from softehl.cases.seal.states.state import FilmRow
 from softehl.cases.seal.states.state import Observer as SealObserver
 from softehl.cases.seal.states.state import Outcome as SealOutcome
-from softehl.cases.seal.states.summary import answer
+from softehl.cases.seal.states.summary import run_summary
 
 PICTURES = ("curve", "profiles", "section")
 """Names of the files, each .png or .svg or both, of every run."""
@@ -38,7 +38,7 @@ class ORingCase(Case[Seal, FilmRow]):
     parameters = Seal
     row = FilmRow
     selection = ("speeds", "stroke", "travel", "solver", "linear", "tolerance")
-    ways = ("solver", "linear")
+    method_keys = ("solver", "linear")
     files = (
         *("sensitivity.csv", "sensitivity_*.csv", "tolerances.csv"),
         *("leakage.csv", "fit.csv", "contact_*.csv", "contact_*.vtu", *paraview.FILES),
@@ -81,28 +81,28 @@ class ORingCase(Case[Seal, FilmRow]):
         """See :class:`Case`."""
         collapsed = super().complaints(parameters, rows, rejected, advice)
         outside = run_plan.outside_tolerance(parameters, rows)
-        words = [f"collapsed film, {complaint}" for complaint in collapsed]
+        messages = [f"collapsed film, {complaint}" for complaint in collapsed]
         if outside:
-            words.append(f"h* not known to {parameters.tolerance:g} %: {self.named(outside)}")
+            messages.append(f"h* not known to {parameters.tolerance:g} %: {self.named(outside)}")
         if parameters.sensitivity:
-            words += _not_differentiated(rows)
-        return words
+            messages += _not_differentiated(rows)
+        return messages
 
-    def assumed(self, parameters: Seal, given: Collection[str]) -> list[str]:
+    def assumed(self, parameters: Seal, set_keys: Collection[str]) -> list[str]:
         """See :class:`Case`."""
-        return assumed(parameters, given)
+        return assumed(parameters, set_keys)
 
     def warnings(self, parameters: Seal) -> list[str]:
         """See :class:`Case`."""
         return warnings(parameters, parameters.sealed_pressure)
 
-    def answer(self, parameters: Seal, rows: Sequence[FilmRow]) -> list[str]:
+    def summary(self, parameters: Seal, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""
-        return answer(rows, parameters.travel, parameters.stroke)
+        return run_summary(rows, parameters.travel, parameters.stroke)
 
-    def told(self, parameters: Seal, folder: Path) -> list[str]:
+    def details(self, parameters: Seal, folder: Path) -> list[str]:
         """See :class:`Case`: tolerances and sensitivities."""
-        return tables.told(parameters, folder)
+        return tables.sensitivity_lines(parameters, folder)
 
     def merits(self, parameters: Seal, rows: Sequence[FilmRow]) -> Mapping[str, float]:
         """See :class:`Case`; of all speeds the worst."""
@@ -132,15 +132,15 @@ class ORingCase(Case[Seal, FilmRow]):
         self, rows: Sequence[FilmRow], advice: Mapping[float, str] = MappingProxyType({})
     ) -> list[str]:
         """See :class:`Case`."""
-        found = run_plan.doubts(rows, advice)
-        doubts = [f"{words}: {self.named(some)}" for words, some in found.items()]
+        reservations = run_plan.reservations(rows, advice)
+        doubts = [f"{text}: {self.named(some)}" for text, some in reservations.items()]
         thin = [row for row in rows if not row.regime and row.h_min_um < run_plan.THIN]
         if not thin:
             return doubts
-        words = (
+        text = (
             f"films below {run_plan.THIN:g} um, where surfaces of {run_plan.USUAL:g} um rms touch"
         )
-        return [*doubts, f"smooth surfaces: {words}: {self.named(thin)}; give their roughness"]
+        return [*doubts, f"smooth surfaces: {text}: {self.named(thin)}; give their roughness"]
 
     def cautions(self, parameters: Seal) -> list[str]:
         """See :class:`Case`."""

@@ -108,20 +108,20 @@ def rods(ring: str) -> list[str]:
     where the ring is not understood.
     """
     try:
-        said = read_ring(ring)
+        ring_name = read_ring(ring)
     except NotUnderstoodError:
         return []
-    if said.number is None:
-        sizes: tuple[float, float] = (said.inner, ceil(1.02 * said.inner))
-        bore = said.outer or said.inner + 2.0 * said.section
-    elif said.number in as568():
-        inner = as568()[said.number].inner_diameter
+    if ring_name.number is None:
+        sizes: tuple[float, float] = (ring_name.inner, ceil(1.02 * ring_name.inner))
+        bore = ring_name.outer or ring_name.inner + 2.0 * ring_name.section
+    elif ring_name.number in as568():
+        inner = as568()[ring_name.number].inner_diameter
         sizes = (ceil(inner), round(1.02 * inner, 1))
-        bore = round(as568()[said.number].outer_diameter, 1)
+        bore = round(as568()[ring_name.number].outer_diameter, 1)
     else:
         return []
-    shown = dict.fromkeys(map(number_text, sizes))
-    found = [f"{size}{fit}" for size in shown for fit in _FITS]
+    texts = dict.fromkeys(map(number_text, sizes))
+    found = [f"{size}{fit}" for size in texts for fit in _FITS]
     return [*found, *(f"{BORE}{number_text(bore)}{fit}" for fit in _HOLES)]
 
 
@@ -169,16 +169,16 @@ class Form:
             placeholder="stroke = out",
             sizing_mode="stretch_width",
         )
-        for shown in ("value", "value_input"):
-            self.widgets["ring"].param.watch(self._offer_rods, shown)
+        for attribute in ("value", "value_input"):
+            self.widgets["ring"].param.watch(self._offer_rods, attribute)
 
-    def watch(self, told: Callable[[Any], None]) -> None:
+    def watch(self, on_change: Callable[[Any], None]) -> None:
         """Call a function whenever a value changes, or what is typed in a field."""
         for key, widget in self.widgets.items():
             if key in _TEXTS:
                 widget.param.watch(lambda event: _show_text(event.obj), "value")
-                widget.param.watch(told, "value_input")
-            widget.param.watch(told, "value")
+                widget.param.watch(on_change, "value_input")
+            widget.param.watch(on_change, "value")
 
     def settle(self) -> None:
         """Take over what was typed and not entered: the form is what its fields show."""
@@ -222,7 +222,7 @@ class Form:
             checked = validated(case.parameters, values, dict.fromkeys(values, _HERE))
         except BadInput as error:
             raise BadInput(error.message.removeprefix(f"{_HERE}: ")) from None
-        return Run(case, checked, given=frozenset(values)), values
+        return Run(case, checked, set_keys=frozenset(values)), values
 
     def _offer_rods(self, event: Any) -> None:
         """Offer the rods that a new ring goes with, and take the usual one."""
@@ -272,7 +272,7 @@ class Page:
         self.drawing = pn.pane.SVG(
             max_width=460, encode=False, sizing_mode="stretch_width", styles={"flex": "1 1 20rem"}
         )
-        self.words = pn.pane.Alert(alert_type="light", styles={"flex": "1 1 18rem"})
+        self.preview_text = pn.pane.Alert(alert_type="light", styles={"flex": "1 1 18rem"})
         self.begin = pn.widgets.Button(name="Run", button_type="primary", **_WIDE)
         self.table = pn.widgets.Tabulator(
             pd.DataFrame(),
@@ -289,14 +289,14 @@ class Page:
         self.stop = pn.widgets.Button(name="Stop", button_type="danger", disabled=True)
         self.go_on = pn.widgets.Button(name="Go on", disabled=True)
         self.progress = pn.indicators.Progress(value=0, max=100, **_WIDE)
-        self.told = pn.pane.Str("", styles={"white-space": "pre-wrap"}, **_WIDE)
+        self.run_status = pn.pane.Str("", styles={"white-space": "pre-wrap"}, **_WIDE)
         self.links = pn.pane.HTML("", **_WIDE)
-        self.answer = pn.Column(**_WIDE)
+        self.summaries = pn.Column(**_WIDE)
         self.plots = pn.pane.Bokeh(None), pn.pane.Bokeh(None)
         self.curves = pn.FlexBox(*self.plots)
-        self.chosen: list[str] = []
+        self.selected: list[str] = []
         self._names: list[str] = []
-        self._shown: object = None
+        self._display_state: object = None
 
     def view(self) -> Any:
         """The page, alive."""
@@ -317,13 +317,13 @@ class Page:
             busy_indicator=None,  # it changes the document outside the lock
             sidebar=[*self.form.widgets.values(), self.begin],
             main=[
-                pn.FlexBox(self.drawing, self.words, **_WIDE),
+                pn.FlexBox(self.drawing, self.preview_text, **_WIDE),
                 pn.pane.Markdown("## Runs"),
                 self.table,
                 self.progress,
-                self.told,
+                self.run_status,
                 buttons,
-                self.answer,
+                self.summaries,
                 self.curves,
             ],
         )
@@ -341,13 +341,15 @@ class Page:
         try:
             run, _ = self.form.run()
         except BadInput as error:
-            self.words.param.update(object=html.escape(error.message), alert_type="danger")
+            self.preview_text.param.update(object=html.escape(error.message), alert_type="danger")
             self.begin.disabled = True
             return
         self.form.settle()
         self.drawing.object = _drawing(run)
         warned = bool(run.case.warnings(run.parameters))
-        self.words.param.update(object=_messages(run), alert_type="warning" if warned else "light")
+        self.preview_text.param.update(
+            object=_messages(run), alert_type="warning" if warned else "light"
+        )
         self.begin.disabled = False
 
     def _start(self) -> None:
@@ -355,81 +357,83 @@ class Page:
             _, values = self.form.run()
             name = self.desk.start(values)
         except (BadInput, OSError) as error:
-            self.words.param.update(object=html.escape(str(error)), alert_type="danger")
+            self.preview_text.param.update(object=html.escape(str(error)), alert_type="danger")
             return
-        self.chosen = [name]
+        self.selected = [name]
         self._look()
 
     # --- runs -----------------------------------------------------------------------------------
 
     def _choose(self) -> None:
-        self.chosen = [self._names[number] for number in self.table.selection]
+        self.selected = [self._names[number] for number in self.table.selection]
         self._look()
 
     def _end(self) -> None:
-        for name in self.chosen:
+        for name in self.selected:
             self.desk.stop(name)
 
     def _resume(self) -> None:
         try:
-            for name in self.chosen:
+            for name in self.selected:
                 self.desk.resume(name)
         except BadInput as error:
-            self.told.object = error.message
+            self.run_status.object = error.message
             return
         self._look()
 
     def _look(self) -> None:
         """Show what has changed since the last look."""
         states = self.desk.states()
-        known = [state.name for state in states]
-        self.chosen = [name for name in self.chosen if name in known] or known[:1]
+        names = [state.name for state in states]
+        self.selected = [name for name in self.selected if name in names] or names[:1]
         rows = [_cells(state) for state in states]
-        chosen = [state for state in states if state.name in self.chosen]
-        shown = rows, self.chosen, [state.line for state in chosen]
-        if shown == self._shown:
+        selected = [state for state in states if state.name in self.selected]
+        display_state = rows, self.selected, [state.line for state in selected]
+        if display_state == self._display_state:
             return
-        self._shown = shown
+        self._display_state = display_state
         with pn.io.hold():  # one message: parts of several may refer to what is gone by then
             self._list(states, rows)
-            self._show(chosen)
+            self._show(selected)
 
     def _list(self, states: Sequence[RunState], rows: Sequence[dict[str, str]]) -> None:
         self._names = [state.name for state in states]
         self.table.value = pd.DataFrame(list(rows), columns=list(_COLUMNS))
-        selection = [self._names.index(name) for name in self.chosen]
+        selection = [self._names.index(name) for name in self.selected]
         if self.table.selection != selection:
             self.table.selection = selection
 
-    def _show(self, chosen: Sequence[RunState]) -> None:
+    def _show(self, selected: Sequence[RunState]) -> None:
         """The chosen runs: how far they are, their answers and curves, what can be done."""
-        self.stop.disabled = not any(state.running for state in chosen)
-        self.go_on.disabled = any(s.running or s.status == "done" for s in chosen) or not chosen
-        asked, done = (sum(getattr(s, name) for s in chosen) for name in ("asked", "done"))
-        self.progress.value = round(100 * done / asked) if asked else 0
-        self.told.object = "\n".join(
+        self.stop.disabled = not any(state.running for state in selected)
+        self.go_on.disabled = any(s.running or s.status == "done" for s in selected) or not selected
+        requested, done = (
+            sum(getattr(s, name) for s in selected) for name in ("requested", "done")
+        )
+        self.progress.value = round(100 * done / requested) if requested else 0
+        self.run_status.object = "\n".join(
             f"{s.name}: {_SAVED if s.status == 'stopped' else s.line}"
-            for s in chosen
+            for s in selected
             if s.status != "done"
         )
-        found = [state.run for state in chosen if state.run is not None and state.run.rows]
-        self.links.object = _links([run.name for run in found])
-        self.answer.objects = [
+        runs = [state.run for state in selected if state.run is not None and state.run.rows]
+        self.links.object = _links([run.name for run in runs])
+        self.summaries.objects = [
             pn.pane.Alert(
                 f"**{html.escape(run.name)}**: " + "<br>".join(map(html.escape, lines)),
                 alert_type="danger" if any(isinstance(x, Alarm) for x in lines) else "light",
             )
-            for run in found
+            for run in runs
             if (lines := _lines(run))
         ]
-        plots = (curve_plot(found), friction_plot(found)) if found else (None, None)
+        plots = (curve_plot(runs), friction_plot(runs)) if runs else (None, None)
         for pane, plot in zip(self.plots, plots, strict=True):
             pane.object = plot
 
 
 def _lines(run: FinishedRun) -> list[str]:
     """The answer of a run, and the reasons for states that are not ok."""
-    return [*run.answer, *run.case.notes(run.rows, advice_of(run.content, run.rows))]
+    return [*run.summary, *run.case.notes(run.rows, advice_of(run.content, run.rows))]
 
 
 _SAVED = "stopped; what it reached is saved"
@@ -447,22 +451,22 @@ def _cells(state: RunState) -> dict[str, str]:
     if state.run is None:
         return cells
     run, p = state.run, state.run.parameters
-    answer = run.answer
+    summary = run.summary
     return cells | {
         "seal": p.ring or f"{p.named} {p.ring_diameter:g}x{p.section_diameter:g}",
         "rubber": p.compound or f"{p.shear_modulus:.3g} MPa",
         "pressure": f"{10 * p.sealed_pressure:g} bar",
-        "states": f"{state.done} of {state.asked}",
-        "answer": answer[0] if answer else "",
+        "states": f"{state.done} of {state.requested}",
+        "answer": summary[0] if summary else "",
     }
 
 
 def _drawing(run: Run) -> str:
     """The gland of a run as SVG."""
-    found = StringIO()
+    buffer = StringIO()
     with style.drawing():
-        gland_figure(run.parameters).savefig(found, format="svg")
-    text = found.getvalue()
+        gland_figure(run.parameters).savefig(buffer, format="svg")
+    text = buffer.getvalue()
     text = text[text.index("<svg") :]  # without the head of a file
     return re.sub(r' (width|height)="[\d.]+pt"', "", text, count=2)  # as wide as the page has room
 
@@ -471,10 +475,10 @@ def _messages(run: Run) -> str:
     """Fit, warnings and what is assumed of a run, as the command line has them."""
     case, p = run.case, run.parameters
     fits = [f"{name} {value:.4g} {unit}" for name, (value, unit) in fit_numbers(p).items()]
-    words = [*case.warnings(p), *case.foreword(p)]
-    if assumed := case.assumed(p, run.given):
-        words.append(f"assumed: {', '.join(assumed)}")
-    return "\n".join(f"- {html.escape(line)}" for line in (*fits, *words))
+    messages = [*case.warnings(p), *case.foreword(p)]
+    if assumed := case.assumed(p, run.set_keys):
+        messages.append(f"assumed: {', '.join(assumed)}")
+    return "\n".join(f"- {html.escape(line)}" for line in (*fits, *messages))
 
 
 def _links(names: Sequence[str]) -> str:

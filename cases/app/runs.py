@@ -31,11 +31,11 @@ _ENDED = {"converged": "done", "not converged": "not all reached", "interrupted"
 
 @dataclass(frozen=True)
 class RunState:
-    """A run as it is shown. asked, done: numbers of states. line: what it told last."""
+    """A run as it is shown. requested, done: numbers of states. line: what it told last."""
 
     name: str
     status: str
-    asked: int = 0
+    requested: int = 0
     done: int = 0
     line: str = ""
     run: FinishedRun | None = None
@@ -88,8 +88,8 @@ class Desk:
         """The runs in the folder, the latest first."""
         if not self.folder.is_dir():
             return []
-        found = [p for p in self.folder.iterdir() if p.is_dir() and _is_run(p)]
-        return [p.name for p in sorted(found, key=_begun, reverse=True)]
+        folders = [p for p in self.folder.iterdir() if p.is_dir() and _is_run(p)]
+        return [p.name for p in sorted(folders, key=_start_time, reverse=True)]
 
     def states(self) -> list[RunState]:
         """Every run of the case of the desk that can be read, the latest first."""
@@ -104,10 +104,10 @@ class Desk:
             ended = self.processes[name].poll() if name in self.processes else None
             status = "running" if running else "stopped" if ended in _STOPPED else "failed"
             return RunState(name, status, line=line)
-        told = str(run.content.get("status"))
-        status = "running" if running else _ENDED.get(told, "stopped")
-        asked = len(run.case.requested(run.parameters))
-        return RunState(name, status, asked, len(run.rows), line, run)
+        recorded_status = str(run.content.get("status"))
+        status = "running" if running else _ENDED.get(recorded_status, "stopped")
+        requested = len(run.case.requested(run.parameters))
+        return RunState(name, status, requested, len(run.rows), line, run)
 
     def case_file(self, name: str) -> str:
         """The case file of a run: as it was given here, else the keys that are not at defaults."""
@@ -117,13 +117,21 @@ class Desk:
         run = self._finished(name)
         if run is None:
             raise BadInput(f"{name} is no run that can be read")
-        given, default = (p.model_dump() for p in (run.parameters, run.case.parameters()))
-        return case_text({k: v for k, v in given.items() if v != default[k] and v is not None})
+        values, default = (p.model_dump() for p in (run.parameters, run.case.parameters()))
+        return case_text({k: v for k, v in values.items() if v != default[k] and v is not None})
 
     def _begin(self, name: str, *options: str) -> None:
-        place = self.folder / name
-        command = [sys.executable, "-m", "softehl", "run", str(place / _FILE), "--out", str(place)]
-        with (place / _LOG).open("wb") as log:
+        folder = self.folder / name
+        command = [
+            sys.executable,
+            "-m",
+            "softehl",
+            "run",
+            str(folder / _FILE),
+            "--out",
+            str(folder),
+        ]
+        with (folder / _LOG).open("wb") as log:
             self.processes[name] = subprocess.Popen(
                 [*command, *options], stdin=subprocess.DEVNULL, stdout=log, stderr=log
             )
@@ -133,11 +141,11 @@ class Desk:
 
     def _finished(self, name: str) -> FinishedRun | None:
         """The run in a folder, read again when it has changed; None where none can be read."""
-        place = self.folder / name
-        stamp = [_stamp(place / file) for file in ("run.json", "curve.csv")]
+        folder = self.folder / name
+        stamp = [_stamp(folder / file) for file in ("run.json", "curve.csv")]
         if self._read.get(name, (None,))[0] != stamp:
             try:
-                run: FinishedRun | None = read_finished(place, SHIPPED)
+                run: FinishedRun | None = read_finished(folder, SHIPPED)
             except BadInput:  # none yet, a sweep
                 run = None
             self._read[name] = stamp, run if run and run.case.name == CASE else None
@@ -145,8 +153,8 @@ class Desk:
 
     def _free(self, values: Mapping[str, Any]) -> str:
         """A new name for a run with these keys."""
-        words = [str(values[key]) for key in ("ring", "rod", "bore", "compound") if values.get(key)]
-        first = re.sub(r"[^A-Za-z0-9.]+", "-", " ".join(words)).strip("-.") or CASE
+        parts = [str(values[key]) for key in ("ring", "rod", "bore", "compound") if values.get(key)]
+        first = re.sub(r"[^A-Za-z0-9.]+", "-", " ".join(parts)).strip("-.") or CASE
         number, name = 1, first
         while (self.folder / name).exists():
             number += 1
@@ -172,17 +180,17 @@ def _is_run(folder: Path) -> bool:
     return any((folder / name).exists() for name in ("run.json", _FILE))
 
 
-def _begun(folder: Path) -> float:
+def _start_time(folder: Path) -> float:
     file = folder / _FILE
     return (file if file.exists() else folder / "run.json").stat().st_mtime
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
         return None
-    return found.st_mtime_ns, found.st_size
+    return status.st_mtime_ns, status.st_size
 
 
 def _last_line(path: Path) -> str:
@@ -190,5 +198,5 @@ def _last_line(path: Path) -> str:
         lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
     except OSError:
         return ""
-    told = [line.strip() for line in lines if line.strip()]
-    return told[-1] if told else ""
+    messages = [line.strip() for line in lines if line.strip()]
+    return messages[-1] if messages else ""

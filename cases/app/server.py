@@ -67,12 +67,12 @@ class Token(AuthProvider):
         return Refusal
 
     def _user(self, handler: RequestHandler) -> str | None:
-        given = handler.get_query_argument("token", "")
-        if compare_digest(given.encode(), self.token.encode()):
+        token = handler.get_query_argument("token", "")
+        if compare_digest(token.encode(), self.token.encode()):
             handler.set_cookie(self.cookie, self.token, httponly=True, samesite="Strict")
             return "engineer"
-        kept = handler.get_cookie(self.cookie) or ""
-        return "engineer" if compare_digest(kept.encode(), self.token.encode()) else None
+        cookie = handler.get_cookie(self.cookie) or ""
+        return "engineer" if compare_digest(cookie.encode(), self.token.encode()) else None
 
 
 class Files(AuthRequestHandler):
@@ -91,16 +91,16 @@ class Files(AuthRequestHandler):
         if kind == "case.toml":
             self._send(f"{names[0]}.toml", self.desk.case_file(names[0]).encode())
             return
-        with tempfile.TemporaryDirectory() as place:
-            await self._report([str(self.desk.folder / name) for name in names], Path(place))
+        with tempfile.TemporaryDirectory() as temporary:
+            await self._report([str(self.desk.folder / name) for name in names], Path(temporary))
             name = "-and-".join(names)[:80]
-            self._send(f"{name}{Path(kind).suffix}", (Path(place) / kind).read_bytes())
+            self._send(f"{name}{Path(kind).suffix}", (Path(temporary) / kind).read_bytes())
 
-    async def _report(self, folders: list[str], place: Path) -> None:
+    async def _report(self, folders: list[str], target: Path) -> None:
         """`softehl report`, in a process of its own."""
         command = [sys.executable, "-m", "softehl", "report", *folders, "--xlsx"]
         process = await asyncio.create_subprocess_exec(
-            *(*command, "--out", str(place / "report.html")),
+            *(*command, "--out", str(target / "report.html")),
             stdout=asyncio.subprocess.DEVNULL,
             stderr=asyncio.subprocess.PIPE,
         )
@@ -157,11 +157,11 @@ def _ended_by(loop: Any) -> Iterator[list[int]]:
         numbers.append(number)
         loop.add_callback_from_signal(loop.stop)
 
-    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    previous = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
     try:
         yield numbers
     finally:
-        for number, handler in before.items():
+        for number, handler in previous.items():
             signal.signal(number, handler)
 
 
@@ -182,6 +182,6 @@ def make(desk: Desk, port: int) -> tuple[Any, str]:
 
 
 def _free_port() -> int:
-    with socket.socket() as found:
-        found.bind((HOST, 0))
-        return int(found.getsockname()[1])
+    with socket.socket() as listener:
+        listener.bind((HOST, 0))
+        return int(listener.getsockname()[1])

@@ -33,11 +33,11 @@ class Case(Generic[P, R]):
 
     name, title: what it is called, and what it is in one line.  parameters, row: their classes.
     list_key: the key whose values the rows follow.  selection: keys that only select rows, which a
-    resumed run may change.  ways: keys that choose a way to the same rows.  files: patterns of the
-    files that it writes beside those of its rows.  shared: name of the folder in which the runs of
-    a sweep leave something for each other, empty for none.  left_out: what its model leaves out, in
-    words for a report.  source: "module:attribute" of a case that does not ship, set when it is
-    loaded.
+    resumed run may change.  method_keys: keys that choose a way to the same rows.  files: patterns
+    of the files that it writes beside those of its rows.  shared: name of the folder in which the
+    runs of a sweep leave something for each other, empty for none.  left_out: what its model leaves
+    out, in words for a report.  source: "module:attribute" of a case that does not ship, set when
+    it is loaded.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Case(Generic[P, R]):
     row: type[R]
     list_key: str = ""
     selection: tuple[str, ...] = ()
-    ways: tuple[str, ...] = ()
+    method_keys: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     shared: str = ""
     left_out: tuple[str, ...] = ()
@@ -78,11 +78,11 @@ class Case(Generic[P, R]):
 
         At most `jobs` sets, to run side by side, or any number to run one after the other.
         """
-        there = {row.key for row in rows}
-        missing = [key for key in self.requested(parameters) if key not in there]
-        shares = [missing[start::jobs] for start in range(jobs)]
-        chosen = [{self.list_key: tuple(share)} for share in shares if share]
-        return [parameters.model_copy(update=update) for update in chosen]
+        present = {row.key for row in rows}
+        missing = [key for key in self.requested(parameters) if key not in present]
+        portions = [missing[start::jobs] for start in range(jobs)]
+        updates = [{self.list_key: tuple(share)} for share in portions if share]
+        return [parameters.model_copy(update=update) for update in updates]
 
     def piece_name(self, piece: P) -> str:
         """A name that distinguishes a piece from those that run beside it."""
@@ -109,19 +109,19 @@ class Case(Generic[P, R]):
         """
         return [f"not a result: {self.named(rejected)}. {advice}"] if rejected else []
 
-    def assumed(self, parameters: P, given: Collection[str]) -> list[str]:
-        """Important values that were not given, in words.  given: the keys that were."""
+    def assumed(self, parameters: P, set_keys: Collection[str]) -> list[str]:
+        """Important values that were not given, in words.  set_keys: the keys that were."""
         return []
 
     def warnings(self, parameters: P) -> list[str]:
         """Unusual settings of a run, told before it begins; it runs all the same."""
         return []
 
-    def answer(self, parameters: P, rows: Sequence[R]) -> list[str]:
+    def summary(self, parameters: P, rows: Sequence[R]) -> list[str]:
         """The main results in words, a line each; what should alarm a reader is an Alarm."""
         return []
 
-    def told(self, parameters: P, folder: Path) -> list[str]:
+    def details(self, parameters: P, folder: Path) -> list[str]:
         """Lines that follow the answer, from other files of a finished run."""
         return []
 
@@ -239,14 +239,14 @@ def find_named_case(name: str, shipped: Mapping[str, str]) -> AnyCase:
 class Run:
     """A case with its checked parameters.
 
-    shared: folder in which runs leave something for each other, None for none.  given: the keys
+    shared: folder in which runs leave something for each other, None for none.  set_keys: the keys
     that a user gave.  pictures: see `Case.draw`.
     """
 
     case: AnyCase
     parameters: Any
     shared: Path | None = None
-    given: frozenset[str] = frozenset()
+    set_keys: frozenset[str] = frozenset()
     pictures: tuple[str, ...] = ("png",)
 
     def solve(self, parameters: Any, observer: Observer) -> Outcome:

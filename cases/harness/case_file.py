@@ -54,28 +54,28 @@ class Contradiction(BadInput):
 
 
 def read_case(
-    given: str,
+    source: str,
     shipped: Shipped,
     assignments: Iterable[str] = (),
     options: Mapping[str, str] = MappingProxyType({}),
 ) -> Run:
-    """Read the case `given` (a shipped name or a TOML file) and apply KEY=VALUE `assignments`.
+    """Read the case `source` (a shipped name or a TOML file) and apply KEY=VALUE `assignments`.
 
     options: keys that have an option of their own, as they were typed.  Raises BadInput.
     """
-    case, values = find_case(given, shipped)
-    origins = dict.fromkeys(values, given)
+    case, values = find_case(source, shipped)
+    origins = dict.fromkeys(values, source)
     typed = [(text, "--set") for text in assignments]
     typed += [(f"{key}={text}", f"--{key}") for key, text in options.items()]
     seen = dict[str, object]()
     for text, origin in typed:
         key, value = read_assignment(text, origin)
         if repr(seen.setdefault(key, value)) != repr(value):
-            both = f"{shown(seen[key])} and {shown(value)}"
+            both = f"{value_text(seen[key])} and {value_text(value)}"
             raise BadInput(f"{origin} {key}: {both}; allowed: one of them")
         origins[_put(values, key, value)] = origin
     checked = validated(case.parameters, values, origins)
-    return Run(case, checked, given=frozenset(values))
+    return Run(case, checked, set_keys=frozenset(values))
 
 
 def _put(values: dict[str, Any], key: str, value: object) -> str:
@@ -89,17 +89,17 @@ def _put(values: dict[str, Any], key: str, value: object) -> str:
     return key.partition(".")[0]
 
 
-def find_case(given: str, shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:
-    """The case `given` (shipped name, "module:attribute" or TOML file), and what the file sets.
+def find_case(source: str, shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:
+    """The case `source` (shipped name, "module:attribute" or TOML file), and what the file sets.
 
     Raises BadInput.
     """
-    named = given in shipped or is_reference(given)
-    name, table = (given, {}) if named else _read_file(given, shipped)
+    named = source in shipped or is_reference(source)
+    name, table = (source, {}) if named else _read_file(source, shipped)
     case = find_named_case(name, shipped)
     for key in files_of(case.parameters):
         if not named and isinstance(table.get(key), str):
-            table[key] = str(Path(given).parent / table[key])
+            table[key] = str(Path(source).parent / table[key])
     return case, table
 
 
@@ -135,19 +135,19 @@ def _toml_value(text: str) -> Any:
     return table["value"] if list(table) == ["value"] else None
 
 
-def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
+def _read_file(path: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
     """The case name and the remaining keys of a TOML file."""
     allowed = f"a TOML file or one of {', '.join(shipped)}"
-    if not Path(given).exists():
-        allowed += _as_value(given, shipped)
-    table = read_toml(given, "no case or file", allowed, shipped)
-    if any(isinstance(table.get(way), dict | list) for way in WAYS):
-        raise BadInput(f"{given} is a study of many runs: softehl sweep {given}")
+    if not Path(path).exists():
+        allowed += _as_value(path, shipped)
+    table = read_toml(path, "no case or file", allowed, shipped)
+    if any(isinstance(table.get(kind), dict | list) for kind in WAYS):
+        raise BadInput(f"{path} is a study of many runs: softehl sweep {path}")
     name = table.pop("case", None)
     if not isinstance(name, str) or not (name in shipped or is_reference(name)):
-        told = "no case" if name is None else f"case = {shown(name)}"
-        allowed = " or ".join(f'case = "{known}"' for known in shipped)
-        raise BadInput(f"{given}: {told}{did_you_mean(str(name), shipped)}; allowed: {allowed}")
+        problem = "no case" if name is None else f"case = {value_text(name)}"
+        allowed = " or ".join(f'case = "{case_name}"' for case_name in shipped)
+        raise BadInput(f"{path}: {problem}{did_you_mean(str(name), shipped)}; allowed: {allowed}")
     return name, table
 
 
@@ -161,27 +161,29 @@ def _as_value(given: str, shipped: Shipped) -> str:
     return ""
 
 
-def read_toml(given: str, missing: str, allowed: str, known: Iterable[str] = ()) -> dict[str, Any]:
+def read_toml(
+    path: str, missing: str, allowed: str, candidates: Iterable[str] = ()
+) -> dict[str, Any]:
     """Content of a TOML file; the words are for a file that is not there.  Raises BadInput."""
     text = ""
     try:
-        text = _text(Path(given))
+        text = _text(Path(path))
         return tomllib.loads(text)
     except FileNotFoundError:
         raise BadInput(
-            f"{missing} {given!r}{did_you_mean(given, known)}; allowed: {allowed}"
+            f"{missing} {path!r}{did_you_mean(path, candidates)}; allowed: {allowed}"
         ) from None
     except OSError as error:
-        raise BadInput(f"cannot read the case file {given!r}: {error.strerror}") from None
+        raise BadInput(f"cannot read the case file {path!r}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
-        words = f"{shortened(str(error), 200)}{_slip(str(error), text)}"
-        raise BadInput(f"{given}: not a TOML file: {words}") from None
+        message = f"{shortened(str(error), 200)}{_slip(str(error), text)}"
+        raise BadInput(f"{path}: not a TOML file: {message}") from None
 
 
 def _slip(error: str, text: str) -> str:
     """The key of a usual slip in the line that an error of TOML names, and what to write."""
     lines = text.splitlines()
-    number = int(found[1]) if (found := re.search(r"at line (\d+)", error)) else 0
+    number = int(match[1]) if (match := re.search(r"at line (\d+)", error)) else 0
     if not 0 < number <= len(lines):
         return ""
     key, _, value = (part.strip() for part in lines[number - 1].partition("="))
@@ -208,16 +210,16 @@ def _text(path: Path) -> str:
 
 def require_known(kind: type[Parameters], keys: Iterable[str], origins: Mapping[str, str]) -> None:
     """Raise BadInput unless a case has all these keys.  origins: where they were given."""
-    known = [one.name for one in keys_of(kind)]
+    names = [one.name for one in keys_of(kind)]
     for key in keys:
         if key not in kind.model_fields:
-            near = (
-                f" ({kind.words[key.lower()]})"
-                if key.lower() in kind.words
-                else did_you_mean(key, known)
+            hint = (
+                f" ({kind.hints[key.lower()]})"
+                if key.lower() in kind.hints
+                else did_you_mean(key, names)
             )
-            told = f"{origins[key]}: unknown key {shortened(key)!r}{near}"
-            raise BadInput(f"{told}; allowed: what `softehl keys` lists")
+            problem = f"{origins[key]}: unknown key {shortened(key)!r}{hint}"
+            raise BadInput(f"{problem}; allowed: what `softehl keys` lists")
 
 
 def validated(
@@ -231,9 +233,9 @@ def validated(
     try:
         return kind(**values)
     except ValidationError as error:
-        words = _one_line(kind, values, origins, error)
+        message = _one_line(kind, values, origins, error)
         alone = error.errors(include_url=False, include_context=False)[0]["loc"]
-        raise (BadInput if alone else Contradiction)(words) from None
+        raise (BadInput if alone else Contradiction)(message) from None
     except KernelError as error:
         raise BadInput(str(error)) from None
 
@@ -256,14 +258,16 @@ def _one_line(
         return f"{' and '.join(sorted(set(origins.values())))}: {reason}"
     key = str(first["loc"][0])
     if key in origins:
-        told = f"{origins[key]}: {key} = {shown(values[key])}"
+        message = f"{origins[key]}: {key} = {value_text(values[key])}"
     else:
-        places = " and ".join(sorted(set(origins.values())))
-        told = f"{places}: {key} = {shown(first['input'])}, which follows from what was given"
-    return f"{told}: {reason}{more}; allowed: {kind.model_fields[key].description}"
+        sources = " and ".join(sorted(set(origins.values())))
+        message = (
+            f"{sources}: {key} = {value_text(first['input'])}, which follows from what was given"
+        )
+    return f"{message}: {reason}{more}; allowed: {kind.model_fields[key].description}"
 
 
-def shown(value: object) -> str:
+def value_text(value: object) -> str:
     """A value in words."""
     return shortened(json.dumps(value, default=str, ensure_ascii=False))
 

@@ -105,7 +105,7 @@ class Observer(Protocol):
         """Files that belong to no row, by name."""
         return None
 
-    def kept(self, key: float) -> tuple[Row, Sequence[Mapping[str, Array]]] | None:
+    def saved_row(self, key: float) -> tuple[Row, Sequence[Mapping[str, Array]]] | None:
         """A row that an earlier run left here, and its tables; None where there is none.
 
         Of a run in this process only.

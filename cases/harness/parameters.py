@@ -44,33 +44,33 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
     names: ClassVar[tuple[str, ...]] = ()
     """Keys that do no more than give values to others, such as the name of a standard part."""
-    words: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    hints: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """A key that there is not -> what to write instead."""
     headings: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
     """Heading -> keys, in the order in which they are listed; the others follow without one."""
 
     @model_validator(mode="before")
     @classmethod
-    def _without_units(cls, given: Any) -> Any:
-        if not isinstance(given, dict):
-            return given
-        worded = cls.worded(given)
+    def _without_units(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
+            return values
+        worded = cls.worded(values)
         return cls.completed(
-            {name: without_unit(cls, name, _listed(cls, name, v)) for name, v in worded.items()}
+            {name: without_unit(cls, name, _as_list(cls, name, v)) for name, v in worded.items()}
         )
 
     @classmethod
-    def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def worded(cls, values: dict[str, Any]) -> dict[str, Any]:
         """The values without words of a trade, before units are read.  Raises ValueError."""
-        return given
+        return values
 
     @classmethod
-    def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def completed(cls, values: dict[str, Any]) -> dict[str, Any]:
         """The values with those that follow from them; for cases whose keys name one another.
 
         Raises ValueError.
         """
-        return given
+        return values
 
     def __hash__(self) -> int:
         """Of all values; a table counts by its entries in any order."""
@@ -120,7 +120,7 @@ def _numeric(kind: Any) -> bool:
     return kind in (int, float) or (bool(parts) and all(map(_numeric, parts)))
 
 
-def _listed(kind: type[Parameters], name: str, value: object) -> object:
+def _as_list(kind: type[Parameters], name: str, value: object) -> object:
     """A value, in a list of its own where a key wants one of such values."""
     field = kind.model_fields.get(name)
     item = _item(field.annotation) if field else None
@@ -161,8 +161,8 @@ def _item(kind: Any) -> Any:
     """Type of the items of a list of any length; None if the type is no list."""
     if get_origin(kind) is not tuple:
         return next(filter(None, map(_item, get_args(kind))), None)
-    first, *rest = get_args(kind)
-    if rest != [...]:
+    first, *others = get_args(kind)
+    if others != [...]:
         return None
     return get_args(first)[0] if get_origin(first) is Annotated else first
 
@@ -197,8 +197,8 @@ def key(
     left out.  file: whether it is the path of a file, which a case file gives relative to itself.
     limits: gt, ge, lt, le and whatever else `pydantic.Field` takes.
     """
-    given = [text.format(limits[name]) for name, text in _BOUNDS.items() if name in limits]
-    bounds = bounds or " and ".join(given)
+    bounds_texts = [text.format(limits[name]) for name, text in _BOUNDS.items() if name in limits]
+    bounds = bounds or " and ".join(bounds_texts)
     extra: dict[str, Any] = {"unit": unit, "bounds": bounds, "meaning": meaning, "file": file}
     return Field(default=default, json_schema_extra=extra, **limits)
 

@@ -44,7 +44,7 @@ class Display:
     ) -> None:
         """Stop showing."""
 
-    def stage(self, worker: str, title: str) -> None:
+    def begin_stage(self, worker: str, title: str) -> None:
         """A stage begins in a worker."""
         LOG.info(title)
         for line in self._foreword:
@@ -65,9 +65,9 @@ class Display:
 class Lines(Display):
     """One line a stage and one a row, on stderr."""
 
-    def stage(self, worker: str, title: str) -> None:
+    def begin_stage(self, worker: str, title: str) -> None:
         """See :class:`Display`."""
-        super().stage(worker, title)
+        super().begin_stage(worker, title)
         self.say(title)
 
     def say(self, line: str) -> None:
@@ -108,9 +108,9 @@ class Bars(Display):
         """See :class:`Display`."""
         self._progress.stop()
 
-    def stage(self, worker: str, title: str) -> None:
+    def begin_stage(self, worker: str, title: str) -> None:
         """See :class:`Display`."""
-        super().stage(worker, title)
+        super().begin_stage(worker, title)
         if worker in self._tasks:
             self._progress.remove_task(self._tasks[worker])
         self._tasks[worker] = self._progress.add_task(title, total=None, count=0, text="")

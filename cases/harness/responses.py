@@ -31,11 +31,11 @@ def draw_responses(folder: Path, rows: Rows, keys: Mapping[str, str], kind: type
     """
     results = [c for c in kind.columns() if c.head and c.kind is float and c != kind.key_column()]
     results = [c for c in results if c.name not in keys]
-    shown = [row for row in rows if row[kind.key_column().name] != ""]
-    results = [c for c in results if any(_is_known(row[c.name]) for row in shown)]
-    varied = {key: unit for key, unit in keys.items() if len({row[key] for row in shown}) > 1}
+    known_rows = [row for row in rows if row[kind.key_column().name] != ""]
+    results = [c for c in results if any(_is_known(row[c.name]) for row in known_rows)]
+    varied = {key: unit for key, unit in keys.items() if len({row[key] for row in known_rows}) > 1}
     for key in varied:
-        _draw(folder / f"response_{key}.png", Response(key, varied, shown, kind), results)
+        _draw(folder / f"response_{key}.png", Response(key, varied, known_rows, kind), results)
     return [f"response_{key}.png" for key in varied]
 
 
@@ -113,7 +113,7 @@ def draw_panel(axes: Axes, response: Response, column: Column) -> tuple[list[Any
     colours = {word: f"C{k}" for k, word in enumerate(others or states)}
     for other, state, rows in series:
         points = sorted(
-            ((_place(row[response.key]), _height(row[column.name])) for row in rows),
+            ((_abscissa(row[response.key]), _height(row[column.name])) for row in rows),
             key=lambda point: (isinstance(point[0], str), point[0]),
         )
         look: dict[str, Any] = {
@@ -123,12 +123,12 @@ def draw_panel(axes: Axes, response: Response, column: Column) -> tuple[list[Any
         }
         axes.plot(*zip(*points, strict=True), alpha=0.7, linewidth=0.8, markersize=4, **look)
     handles = [Line2D([], [], color=c, marker=".", linestyle="") for c in colours.values()]
-    words = list(colours)
+    labels = list(colours)
     if others:
         marks = dict(zip(states, _MARKERS, strict=False))
         handles += [Line2D([], [], color="0.3", marker=m, linestyle="") for m in marks.values()]
-        words += list(marks)
-    return handles, words or ["all states"]
+        labels += list(marks)
+    return handles, labels or ["all states"]
 
 
 def _is_known(value: Cell) -> bool:
@@ -140,6 +140,6 @@ def _height(value: Cell) -> Cell:
     return nan if value == "" else value
 
 
-def _place(value: Cell) -> Cell:
+def _abscissa(value: Cell) -> Cell:
     """Abscissa of a value; words and lists stand side by side."""
     return float(value) if isinstance(value, int) else value

@@ -39,7 +39,7 @@ class Earlier:
 
     content: Mapping[str, Any] = field(default_factory=dict)
     rows: tuple[Any, ...] = ()
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -61,13 +61,13 @@ class Earlier:
 
 def advice_of(content: Mapping[str, Any], rows: Sequence[Row]) -> dict[float, str]:
     """Advice in run.json on rows whose verdict is not ok, by their keys."""
-    found = {}
+    advice = {}
     for row in rows:
         name = row.key_column().name
         for state in content.get("states", ()):
             if isinstance(state, dict) and state.get(name) == row.key:
-                found[row.key] = str(state.get("advice") or "")
-    return found
+                advice[row.key] = str(state.get("advice") or "")
+    return advice
 
 
 def holds_a_run(folder: Path) -> bool:
@@ -104,8 +104,8 @@ def read_earlier(folder: Path, run: Run, version: str | None) -> Earlier:
             f"--resume: {folder} holds a run with {difference}; allowed to differ: "
             f"{', '.join(run.case.selection) or 'nothing'}; {ANEW}"
         )
-    rows, doubts = _believed(folder, run, content)
-    return Earlier(content, tuple(rows), tuple(doubts))
+    rows, warnings = _believed(folder, run, content)
+    return Earlier(content, tuple(rows), tuple(warnings))
 
 
 def _has_rows(path: Path) -> bool:
@@ -127,47 +127,47 @@ def _difference(content: Mapping[str, Any], run: Run, version: str | None) -> st
     """Differences of an earlier run from this one, in words; empty if there are none."""
     if content.get("case") != run.case.reference:
         return f"other parameters: case = {content.get('case')!r}, now {run.case.reference!r}"
-    before, now = content.get("parameters"), run.parameters.model_dump(mode="json")
-    if not isinstance(before, dict):
+    previous, now = content.get("parameters"), run.parameters.model_dump(mode="json")
+    if not isinstance(previous, dict):
         return "other parameters: run.json has none"
-    for key in [*now, *before]:
-        if key not in run.case.selection and before.get(key) != now.get(key):
-            return f"other parameters: {key} = {before.get(key)!r}, now {now.get(key)!r}"
+    for key in [*now, *previous]:
+        if key not in run.case.selection and previous.get(key) != now.get(key):
+            return f"other parameters: {key} = {previous.get(key)!r}, now {now.get(key)!r}"
     versions, kernels = content.get("versions"), content.get("kernels")
     used = versions.get("softehl") if isinstance(versions, dict) else None
     if used != version:
         return f"another version: softehl {used}, now {version}"
-    known = kernel_signatures()
+    signatures = kernel_signatures()
     if not isinstance(kernels, dict) or not kernels:
         return "unknown kernels"
-    other = [name for name, signature in kernels.items() if known.get(name) != signature]
+    other = [name for name, signature in kernels.items() if signatures.get(name) != signature]
     return f"other kernels: {', '.join(map(str, other))}" if other else ""
 
 
 def _believed(folder: Path, run: Run, content: Mapping[str, Any]) -> tuple[list[Row], list[str]]:
     """Rows that can be kept, and words on those that cannot."""
-    states, kept, doubts = _states(content), list[Row](), list[str]()
+    states, intact, warnings = _states(content), list[Row](), list[str]()
     try:
         table = read_csv(folder / "curve.csv", run.case.row.header())
     except (OSError, ValueError) as error:
         table, damage = [], _shortened(error)
         if states:
-            doubts.append(f"curve.csv cannot be read ({damage}): its rows are computed again")
+            warnings.append(f"curve.csv cannot be read ({damage}): its rows are computed again")
     rows: list[Row] = []
     for number, cells in enumerate(table, start=1):
         try:
             rows.append(run.case.row.parse(cells))
         except (ValueError, TypeError, OverflowError):
-            doubts.append(f"line {number + 1} of curve.csv is no row: it is computed again")
+            warnings.append(f"line {number + 1} of curve.csv is no row: it is computed again")
     count = Counter(row.key for row in rows)
     for row in rows:
         reason = "it is there twice" if count[row.key] > 1 else disbelief(folder, row, states)
         reason = reason or edited_table(folder, content, f"_{row.name}.csv")
         if reason:
-            doubts.append(f"{row.label(row.key)}: {reason}; computed again")
+            warnings.append(f"{row.label(row.key)}: {reason}; computed again")
         else:
-            kept.append(row)
-    return kept, list(dict.fromkeys(doubts))
+            intact.append(row)
+    return intact, list(dict.fromkeys(warnings))
 
 
 def edited_table(folder: Path, content: Mapping[str, Any], ending: str = ".csv") -> str:
@@ -176,27 +176,27 @@ def edited_table(folder: Path, content: Mapping[str, Any], ending: str = ".csv")
     content: of run.json. A table that is not there is not believed either.
     """
     digests = content.get("tables")
-    for name, wanted in digests.items() if isinstance(digests, dict) else ():
+    for name, digest in digests.items() if isinstance(digests, dict) else ():
         path = folder / name
-        if name.endswith(ending) and path.exists() and file_digest(path) != wanted:
+        if name.endswith(ending) and path.exists() and file_digest(path) != digest:
             return f"{name} is not what was written"
     return ""
 
 
 def disbelief(folder: Path, row: Row, states: Sequence[Mapping[str, Any]]) -> str:
     """Why a row of curve.csv cannot be believed, empty if it can."""
-    given = _plain(row.as_dict())
-    same = [state for state in states if {k: state.get(k) for k in given} == given]
+    values = _plain(row.as_dict())
+    same = [state for state in states if {k: state.get(k) for k in values} == values]
     if not same:
         return "curve.csv and run.json differ"
     digests = same[0].get("digests")
     for name in row.file_names():
-        wanted = digests.get(name) if isinstance(digests, dict) else None
+        digest = digests.get(name) if isinstance(digests, dict) else None
         try:
-            found = file_digest(folder / name)
+            actual = file_digest(folder / name)
         except OSError:
             return f"{name} is missing"
-        if found != wanted:
+        if actual != digest:
             return f"{name} is not what was written"
     return ""
 

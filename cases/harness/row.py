@@ -25,7 +25,7 @@ class Column:
     """A column of a table: its name there, the type of its cells, its unit and its meaning.
 
     head: what it is called on the terminal, empty if it is not shown there; neighbours with the
-    same head share a column. shown: format of its numbers there.
+    same head share a column. number_format: format of its numbers there.
     """
 
     name: str
@@ -33,14 +33,14 @@ class Column:
     unit: str
     meaning: str
     head: str = ""
-    shown: str = ""
+    number_format: str = ""
 
     @property
     def title(self) -> str:
         """The head of a column for readers: its name in words, and its unit."""
         unit = self.unit.replace("%", "percent").replace(" ", "_").replace("/", "_(per_)?")
-        words = re.sub(f"_{unit}(?=_|$)", "", self.name, count=1).replace("_", " ")
-        return f"{words} [{self.unit}]" if self.unit else words
+        text = re.sub(f"_{unit}(?=_|$)", "", self.name, count=1).replace("_", " ")
+        return f"{text} [{self.unit}]" if self.unit else text
 
     def read(self, text: str) -> Cell:
         """The value of a cell; that of a number which is not there is nan.  Raises ValueError."""
@@ -51,12 +51,16 @@ class Column:
 
     def show(self, value: Cell) -> str:
         """The text of a cell on the terminal; a number that is not known leaves it empty."""
-        return "" if isinstance(value, float) and isnan(value) else format(value, self.shown)
+        return (
+            "" if isinstance(value, float) and isnan(value) else format(value, self.number_format)
+        )
 
 
-def column(unit: str, meaning: str, *, head: str = "", shown: str = "", **default: Any) -> Any:
+def column(
+    unit: str, meaning: str, *, head: str = "", number_format: str = "", **default: Any
+) -> Any:
     """Declare a field of a :class:`Record` to be a column; see :class:`Column`."""
-    return dataclasses.field(metadata={_MARK: (unit, meaning, head, shown)}, **default)
+    return dataclasses.field(metadata={_MARK: (unit, meaning, head, number_format)}, **default)
 
 
 class Record:
@@ -86,8 +90,8 @@ class Record:
     @classmethod
     def parse(cls, cells: Sequence[str]) -> Self:
         """The record from the text of its cells.  Raises ValueError."""
-        given = zip(cls.columns(), cells, strict=True)
-        return cls(**{column.name: column.read(text) for column, text in given})
+        texts = zip(cls.columns(), cells, strict=True)
+        return cls(**{column.name: column.read(text) for column, text in texts})
 
     @classmethod
     def read(cls, path: Path) -> list[Self]:

@@ -116,9 +116,9 @@ class RunRecord:
         self._lock.release()
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """Rows of an earlier run that are not intact and are computed again."""
-        return self._earlier.doubts
+        return self._earlier.warnings
 
     @property
     def began(self) -> bool:
@@ -142,7 +142,7 @@ class RunRecord:
         self.curve.save()
         self.save("running", "")
 
-    def stage(self, name: str, where: Mapping[str, Any]) -> StageLog:
+    def open_stage(self, name: str, where: Mapping[str, Any]) -> StageLog:
         """Open the log of a new stage."""
         self.begin()
         self._logs.append(StageLog(name, where))
@@ -190,7 +190,7 @@ class RunRecord:
                 "solvers": dict(outcome.solvers),
                 "numbers": dict(outcome.numbers),
             }
-        self._stages = [stage for outcome in outcomes for stage in outcome.stages] or None
+        self._stages = [record for outcome in outcomes for record in outcome.stages] or None
 
     def save(self, status: str, message: str) -> None:
         """Write the further tables of the case that have rows, then run.json."""
@@ -204,7 +204,7 @@ class RunRecord:
             "status": status,
             "message": message,
             "warnings": self.run.case.warnings(self.run.parameters),
-            "assumed": self.run.case.assumed(self.run.parameters, self.run.given),
+            "assumed": self.run.case.assumed(self.run.parameters, self.run.set_keys),
             "parameters": self.run.parameters.model_dump(),
             "versions": package_versions(),
             **self._size,
@@ -246,8 +246,8 @@ class RunRecord:
         names = row.file_names()
         digests = {name: curve.digests.get(name) for name in names}
         files = [str(Path(folder, name)) for name in names]
-        words = {"advice": self.advice.get(row.key, "")}
-        return row.as_dict() | words | {"files": files, "digests": digests}
+        advice = {"advice": self.advice.get(row.key, "")}
+        return row.as_dict() | advice | {"files": files, "digests": digests}
 
 
 def table_digests(folder: Path, case: AnyCase) -> dict[str, str]:
@@ -256,10 +256,10 @@ def table_digests(folder: Path, case: AnyCase) -> dict[str, str]:
     return {path.name: file_digest(path) for path in sorted(paths)}
 
 
-def refusal(folder: Path, kept: str) -> BadInput:
-    """For a folder that holds an earlier run; kept: what --resume keeps of it."""
+def refusal(folder: Path, contents: str) -> BadInput:
+    """For a folder that holds an earlier run; contents: what --resume keeps of it."""
     return BadInput(
-        f"{folder} holds an earlier run; --resume keeps its {kept}, --overwrite begins anew, "
+        f"{folder} holds an earlier run; --resume keeps its {contents}, --overwrite begins anew, "
         "--out names another folder"
     )
 
@@ -301,16 +301,16 @@ def _remove_earlier(folder: Path, case: AnyCase) -> None:
             path.unlink()
 
 
-def _stage_json(stage: StageRecord) -> dict[str, Any]:
-    parameters = stage.parameters or (None,) * len(stage.residual_histories)
-    steps = zip(parameters, stage.residual_histories, strict=False)
+def _stage_json(record: StageRecord) -> dict[str, Any]:
+    parameters = record.parameters or (None,) * len(record.residual_histories)
+    steps = zip(parameters, record.residual_histories, strict=False)
     return {
-        "name": stage.name,
-        **stage.where,
-        "method": stage.method,
-        "seconds": stage.seconds,
-        "factorisations": stage.factorisations,
-        "iterations": stage.iterations,
+        "name": record.name,
+        **record.where,
+        "method": record.method,
+        "seconds": record.seconds,
+        "factorisations": record.factorisations,
+        "iterations": record.iterations,
         "steps": [{"parameter": p, "residuals": history} for p, history in steps],
     }
 

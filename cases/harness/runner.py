@@ -36,7 +36,7 @@ def run_case(run: Run, folder: Path, existing: Existing, *, jobs: int, quiet: bo
     folder or the kernels cannot be used.
     """
     with RunRecord(folder, run, existing) as record:
-        for doubt in record.doubts:
+        for doubt in record.warnings:
             click.echo(f"softehl: {doubt}", err=True)
         for warning in () if quiet else run.case.warnings(run.parameters):
             click.echo(f"softehl: {warning}", err=True)
@@ -84,7 +84,7 @@ class Teller(Observer):
 
     def stage(self, name: str, *, title: str, where: Mapping[str, Any]) -> None:
         """See :class:`Observer`."""
-        self.display.stage("", title)
+        self.display.begin_stage("", title)
 
     def step(self, **step: Unpack[Step]) -> None:
         """See :class:`Observer`."""
@@ -107,8 +107,8 @@ class Reporter(Observer):
     def stage(self, name: str, *, title: str, where: Mapping[str, Any]) -> None:
         """See :class:`Observer`."""
         with writing(self.record.folder):
-            self.log = self.record.stage(name, where)
-        self.display.stage(self.worker, title)
+            self.log = self.record.open_stage(name, where)
+        self.display.begin_stage(self.worker, title)
 
     def step(self, **step: Unpack[Step]) -> None:
         """See :class:`Observer`."""
@@ -129,7 +129,7 @@ class Reporter(Observer):
         with writing(self.record.folder):
             self.record.files(contents)
 
-    def kept(self, key: float) -> tuple[Row, Sequence[Mapping[str, Array]]] | None:
+    def saved_row(self, key: float) -> tuple[Row, Sequence[Mapping[str, Array]]] | None:
         """See :class:`Observer`."""
         for row in self.record.curve.rows:
             if row.key == key:
@@ -196,12 +196,12 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
         _save(record, complaints)  # with the tables that were written meanwhile
     if not quiet and (rows or rejected):
         table.print_rows(case, rows, rejected)
-        for line in case.answer(record.run.parameters, rows):
+        for line in case.summary(record.run.parameters, rows):
             click.secho(line, fg="red" if isinstance(line, Alarm) else None)
-        for line in case.told(record.run.parameters, record.folder):
+        for line in case.details(record.run.parameters, record.folder):
             click.echo(line)
-        if words := case.assumed(record.run.parameters, record.run.given):
-            click.echo(f"assumed: {', '.join(words)}")
+        if assumptions := case.assumed(record.run.parameters, record.run.set_keys):
+            click.echo(f"assumed: {', '.join(assumptions)}")
         for note in case.notes(rows, record.advice):
             click.echo(note)
     if not quiet:
@@ -225,8 +225,8 @@ def _failures(outcomes: Sequence[Outcome]) -> list[str]:
 def _gaps(record: RunRecord) -> list[str]:
     """The requested states that are not results, and why not."""
     run, rows, rejected = record.run, record.curve.rows, record.rejected.rows
-    there = {row.key for row in [*rows, *rejected]}
-    missed = [run.case.row.label(k) for k in run.case.requested(run.parameters) if k not in there]
+    reached = {row.key for row in [*rows, *rejected]}
+    missed = [run.case.row.label(k) for k in run.case.requested(run.parameters) if k not in reached]
     gaps = [f"not reached: {', '.join(missed)}"] if missed else []
     advice = " ".join(sorted({record.advice.get(row.key, "") for row in rejected}))
     return [*gaps, *run.case.complaints(run.parameters, rows, rejected, advice)]

@@ -64,48 +64,48 @@ class Random(Form):
     tolerances: dict[str, Any] = Field(min_length=1)
 
 
-def table_of(kind: type[F], given: object, where: str) -> F:
+def table_of(kind: type[F], content: object, where: str) -> F:
     """A table of a study, checked.  Raises BadInput."""
     names = [field.alias or name for name, field in kind.model_fields.items()]
-    if not isinstance(given, dict):
-        raise BadInput(f"{where} = {given!r}: allowed: a table of {', '.join(names)}")
-    for name in given:
+    if not isinstance(content, dict):
+        raise BadInput(f"{where} = {content!r}: allowed: a table of {', '.join(names)}")
+    for name in content:
         if name not in names:
             hint = did_you_mean(name, names)
             raise BadInput(f"{where}: unknown {name!r}{hint}; allowed: {', '.join(names)}")
     try:
-        return kind(**given)
+        return kind(**content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         name = str(first["loc"][0])
-        told = f"{name} = {given[name]!r}: " if name in given else f"{name} is missing: "
-        raise BadInput(f"{where} {told}{first['msg'].lower()}") from None
+        problem = f"{name} = {content[name]!r}: " if name in content else f"{name} is missing: "
+        raise BadInput(f"{where} {problem}{first['msg'].lower()}") from None
 
 
 def grid_points(axes: Mapping[str, Any], read: Read) -> Points:
     """Every combination of the values of each key; the last key varies fastest.  BadInput."""
     if not axes:
         raise BadInput("[grid] is empty; allowed: a list of values for each key that is varied")
-    values = [_axis(key, given, read) for key, given in axes.items()]
+    values = [_axis(key, axis, read) for key, axis in axes.items()]
     count = math.prod(map(len, values))
     if count > MOST:
         raise BadInput(f"[grid] has {count} combinations; allowed: at most {MOST}")
     return [dict(zip(axes, combination, strict=True)) for combination in product(*values)]
 
 
-def _axis(key: str, given: object, read: Read) -> list[Any]:
-    if isinstance(given, dict):
-        return _spaced(key, given, read)
-    if not isinstance(given, list) or not given:
+def _axis(key: str, axis: object, read: Read) -> list[Any]:
+    if isinstance(axis, dict):
+        return _spaced(key, axis, read)
+    if not isinstance(axis, list) or not axis:
         raise BadInput(
-            f"[grid] {key} = {given!r}: allowed: a list of values, or "
+            f"[grid] {key} = {axis!r}: allowed: a list of values, or "
             '{from = 1, to = 2, count = 5}, with spacing = "log" if wanted'
         )
-    return [read(key, value) for value in given]
+    return [read(key, value) for value in axis]
 
 
-def _spaced(key: str, given: Mapping[str, Any], read: Read) -> list[Any]:
-    span = table_of(Span, given, f"[grid] {key}")
+def _spaced(key: str, axis: Mapping[str, Any], read: Read) -> list[Any]:
+    span = table_of(Span, axis, f"[grid] {key}")
     low, high = _bounds(f"[grid] {key}", read(key, span.start), read(key, span.to))
     if span.spacing == "linear":
         values = np.linspace(low, high, span.count)
@@ -113,8 +113,8 @@ def _spaced(key: str, given: Mapping[str, Any], read: Read) -> list[Any]:
         values = np.geomspace(low, high, span.count)
     else:
         raise BadInput(f"[grid] {key}: from = {low:g} has no logarithm; allowed: more than 0")
-    whole = isinstance(span.start, int) and isinstance(span.to, int)
-    if whole and np.array_equal(values, np.round(values)):
+    integers = isinstance(span.start, int) and isinstance(span.to, int)
+    if integers and np.array_equal(values, np.round(values)):
         return [int(value) for value in values]
     return [float(value) for value in values]
 
@@ -133,26 +133,26 @@ def list_points(entries: Sequence[Any], read: Read, otherwise: Mapping[str, Any]
 def hypercube_points(table: Hypercube, read: Read) -> Points:
     """A Latin hypercube between the bounds of each key, the same for the same seed.  BadInput."""
     where = "[latin_hypercube] between."
-    box = [_pair(f"{where}{key}", key, given, read) for key, given in table.between.items()]
+    box = [_pair(f"{where}{key}", key, bounds, read) for key, bounds in table.between.items()]
     low, high = np.array(box, dtype=np.float64).T
     random = np.random.default_rng(table.seed)
-    shares = qmc.LatinHypercube(len(box), seed=random).random(table.count)
-    return _named(list(table.between), low + shares * (high - low))
+    fractions = qmc.LatinHypercube(len(box), seed=random).random(table.count)
+    return _named(list(table.between), low + fractions * (high - low))
 
 
-def _pair(where: str, key: str, given: object, read: Read) -> tuple[float, float]:
-    if not isinstance(given, list) or len(given) != 2:
-        raise BadInput(f"{where} = {given!r}: allowed: [least, largest]")
-    return _bounds(where, *(read(key, value) for value in given))
+def _pair(where: str, key: str, bounds: object, read: Read) -> tuple[float, float]:
+    if not isinstance(bounds, list) or len(bounds) != 2:
+        raise BadInput(f"{where} = {bounds!r}: allowed: [least, largest]")
+    return _bounds(where, *(read(key, value) for value in bounds))
 
 
 def _bounds(where: str, low: object, high: object) -> tuple[float, float]:
     if not _is_number(low) or not _is_number(high):
         raise BadInput(f"{where}: {low!r} to {high!r} is no range; allowed: two numbers")
-    least, largest = float(low), float(high)
-    if not least < largest:
-        raise BadInput(f"{where}: from {least:g} to {largest:g}; allowed: the smaller one first")
-    return least, largest
+    minimum, largest = float(low), float(high)
+    if not minimum < largest:
+        raise BadInput(f"{where}: from {minimum:g} to {largest:g}; allowed: the smaller one first")
+    return minimum, largest
 
 
 def _is_number(value: object) -> TypeGuard[float]:
@@ -173,38 +173,38 @@ def tolerance_points(table: Random, values: Mapping[str, Any], read: Read) -> Po
     A tolerance is the largest deviation of a uniform, twice the standard deviation of a normal
     distribution.  The first points of a study of more points are the same.
     """
-    found = [_tolerance(name, given, values, read) for name, given in table.tolerances.items()]
-    keys = [key for tolerance in found for key in tolerance.keys]
+    tolerances = [_tolerance(name, text, values, read) for name, text in table.tolerances.items()]
+    keys = [key for tolerance in tolerances for key in tolerance.keys]
     if len(set(keys)) < len(keys):
         raise BadInput("[random] tolerances: a key is given twice; allowed: once")
-    random, shape = np.random.default_rng(table.seed), (table.count, len(found))
+    random, shape = np.random.default_rng(table.seed), (table.count, len(tolerances))
     if table.distribution == "uniform":
-        shares = random.uniform(-1.0, 1.0, shape)
+        fractions = random.uniform(-1.0, 1.0, shape)
     else:
-        shares = random.normal(size=shape) / NORMAL_DEVIATIONS
+        fractions = random.normal(size=shape) / NORMAL_DEVIATIONS
     columns = [
-        values[key] * (1.0 + tolerance.share * shares[:, n])
-        for n, tolerance in enumerate(found)
+        values[key] * (1.0 + tolerance.share * fractions[:, n])
+        for n, tolerance in enumerate(tolerances)
         for key in tolerance.keys
     ]
     return _named(keys, np.stack(columns, axis=1))
 
 
-def _tolerance(name: str, given: object, values: Mapping[str, Any], read: Read) -> Tolerance:
+def _tolerance(name: str, text: object, values: Mapping[str, Any], read: Read) -> Tolerance:
     """Tolerance of a line `"key, other" = "15 %"`, a share of both, or `key = "0.05 mm"`."""
-    where = f"[random] tolerances.{name} = {given!r}"
+    where = f"[random] tolerances.{name} = {text!r}"
     keys = tuple(part.strip() for part in name.split(","))
     for key in keys:
         read(key, 1.0)
         if not _is_number(values.get(key)) or not values[key]:
-            near = [k for k in values if k.startswith(f"{key}_") and _is_number(values[k])]
-            instead = f", as {' or '.join(near)} has" if near else ""
-            told = f"{where}: {key} = {values.get(key)!r}"
-            raise BadInput(f"{told}; allowed: a key with a number that is not 0{instead}")
-    percent = _SHARE.fullmatch(given.strip()) if isinstance(given, str) else None
+            candidates = [k for k in values if k.startswith(f"{key}_") and _is_number(values[k])]
+            instead = f", as {' or '.join(candidates)} has" if candidates else ""
+            message = f"{where}: {key} = {values.get(key)!r}"
+            raise BadInput(f"{message}; allowed: a key with a number that is not 0{instead}")
+    percent = _SHARE.fullmatch(text.strip()) if isinstance(text, str) else None
     if percent:
         return Tolerance(keys, 0.01 * float(percent["size"]))
-    size = read(keys[0], given)
+    size = read(keys[0], text)
     if len(keys) > 1 or not _is_number(size) or not size > 0.0:
         raise BadInput(
             f'{where}: allowed: a share as in "15 %", or of one key a number in its unit'

@@ -28,11 +28,11 @@ def signals() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    previous = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in previous.items():
             signal.signal(number, handler)
 
 
@@ -65,11 +65,11 @@ def readers_that_leave() -> Iterator[None]:
 
     A stream that is closed from the start, as by `>&-`, is None in Python.
     """
-    before = sys.stdout, sys.stderr
+    previous = sys.stdout, sys.stderr
     with open(os.devnull, "w") as nobody:
-        sys.stdout, sys.stderr = (_Stream(nobody if s is None else s) for s in before)
+        sys.stdout, sys.stderr = (_Stream(nobody if s is None else s) for s in previous)
         try:
             yield
             sys.stdout.flush()
         finally:
-            sys.stdout, sys.stderr = before
+            sys.stdout, sys.stderr = previous

@@ -152,38 +152,38 @@ def in_order(tasks: Sequence[Task]) -> list[Task]:
 
 
 def named(
-    given: Iterable[Parameters] | Mapping[str, Parameters],
+    cases: Iterable[Parameters] | Mapping[str, Parameters],
     case_of: Callable[[Parameters], AnyCase],
 ) -> dict[str, tuple[AnyCase, Parameters]]:
     """Folder name -> case and parameters.
 
     Raises BadInput for two of one name, for one too long, and for one that is no plain name.
     """
-    if isinstance(given, Mapping):
-        pairs = [(case_of(parameters), parameters) for parameters in given.values()]
-        for name, (case, _) in zip(given, pairs, strict=True):
+    if isinstance(cases, Mapping):
+        pairs = [(case_of(parameters), parameters) for parameters in cases.values()]
+        for name, (case, _) in zip(cases, pairs, strict=True):
             _require_plain(name, case)
-        return dict(zip(given, pairs, strict=True))
-    pairs = [(case_of(parameters), parameters) for parameters in given]
-    found = {_name(*pair): pair for pair in pairs}
-    if len(found) < len(pairs):
+        return dict(zip(cases, pairs, strict=True))
+    pairs = [(case_of(parameters), parameters) for parameters in cases]
+    named_pairs = {_name(*pair): pair for pair in pairs}
+    if len(named_pairs) < len(pairs):
         raise BadInput("two curves would have the same folder; allowed: a dict of named cases")
-    return found
+    return named_pairs
 
 
 def _require_plain(name: object, case: AnyCase) -> None:
     """Raise BadInput unless a name is one component of a path, and none that has a meaning."""
-    wrong = not isinstance(name, str) or name != name.strip() or name in ("", ".", "..")
-    if wrong or set(str(name)) & {"/", "\\", "\0"} or name == case.shared:
-        taken = f", and {case.shared!r} is taken" if case.shared else ""
-        raise BadInput(f"{name!r} is no name for a curve; allowed: a plain folder name{taken}")
+    invalid = not isinstance(name, str) or name != name.strip() or name in ("", ".", "..")
+    if invalid or set(str(name)) & {"/", "\\", "\0"} or name == case.shared:
+        reserved = f", and {case.shared!r} is taken" if case.shared else ""
+        raise BadInput(f"{name!r} is no name for a curve; allowed: a plain folder name{reserved}")
     if len(str(name)) > _LONGEST:
         raise BadInput(f"the name {str(name)[:20]}... is too long; allowed: {_LONGEST} letters")
 
 
 def _name(case: AnyCase, parameters: Parameters) -> str:
     """Folder name of the keys that are not at their defaults; BadInput if it is too long."""
-    name = "-".join(differences(parameters, case.parameters(), case.ways)) or "default"
+    name = "-".join(differences(parameters, case.parameters(), case.method_keys)) or "default"
     if len(name) > _LONGEST:
         raise BadInput(f"a folder called {name} would be too long; allowed: a dict of named cases")
     return name
@@ -192,8 +192,8 @@ def _name(case: AnyCase, parameters: Parameters) -> str:
 def differences(parameters: Parameters, default: Parameters, but: Iterable[str]) -> list[str]:
     """Keys that differ from `default`, as `key=value` for a folder name, but for some keys."""
     usual = default.model_dump()
-    given = parameters.model_dump(exclude=set(but))
-    return [f"{key}={_text(value)}" for key, value in given.items() if value != usual[key]]
+    values = parameters.model_dump(exclude=set(but))
+    return [f"{key}={_text(value)}" for key, value in values.items() if value != usual[key]]
 
 
 def _text(value: object) -> str:
@@ -216,7 +216,7 @@ class SweepRecord:
         self.curves: dict[int, Curve] = {}
         self.missing: list[Task] = []
         self._lock = FolderLock(folder)
-        self._before, self._began, self._saved = 0.0, time.monotonic(), 0.0
+        self._previous_seconds, self._began, self._saved = 0.0, time.monotonic(), 0.0
         require_folder(folder)
         self._earlier: Mapping[str, Any] = {}
         if self._holds():
@@ -245,11 +245,11 @@ class SweepRecord:
             if isinstance(parameters, str):
                 continue
             folder = base / RUNS / f"{number + 1:05d}"
-            found = self._kept(Task(Run(case, parameters, shared), folder, "resume"))
-            if isinstance(found, Curve):
-                self.curves[number] = found
+            result = self._resumed(Task(Run(case, parameters, shared), folder, "resume"))
+            if isinstance(result, Curve):
+                self.curves[number] = result
             else:
-                self.missing.append(found)
+                self.missing.append(result)
 
     def add(self, curve: Curve) -> None:
         """Keep a curve that has come in."""
@@ -267,7 +267,7 @@ class SweepRecord:
             "message": message,
             "counts": self.counts(),
             "versions": package_versions(),
-            "seconds": self._before + time.monotonic() - self._began,
+            "seconds": self._previous_seconds + time.monotonic() - self._began,
         }
         write_json(self.folder / "run.json", content)
         self._saved = time.monotonic()
@@ -288,7 +288,7 @@ class SweepRecord:
                 "run": number + 1,
                 **{key: _cell(value) for key, value in point.items()},
                 "status": self.status(number),
-                "words": self._words(number),
+                "words": self._message(number),
             }
             states = [row.as_dict() for row in curve.rows] if curve else []
             rows += [common | _without(state, self.study.keys) for state in states or [{}]]
@@ -300,11 +300,11 @@ class SweepRecord:
 
     def complaint(self) -> str:
         """Number of runs that are not as asked for, and the message of the first of them."""
-        wrong = [n for n in range(len(self.study.runs)) if self.status(n) != "converged"]
-        if not wrong:
+        failed = [n for n in range(len(self.study.runs)) if self.status(n) != "converged"]
+        if not failed:
             return ""
-        first = f"run {wrong[0] + 1} {self.status(wrong[0])}: {self._words(wrong[0])}"
-        return f"{len(wrong)} of {len(self.study.runs)} runs did not converge; {first}"
+        first = f"run {failed[0] + 1} {self.status(failed[0])}: {self._message(failed[0])}"
+        return f"{len(failed)} of {len(self.study.runs)} runs did not converge; {first}"
 
     def status(self, number: int) -> str:
         """Status of a run: converged, not converged, failed, not possible, or not run."""
@@ -313,20 +313,20 @@ class SweepRecord:
             return "not possible" if isinstance(self.study.runs[number], str) else "not run"
         return "failed" if curve.failed else "converged" if curve.converged else "not converged"
 
-    def _words(self, number: int) -> str:
+    def _message(self, number: int) -> str:
         curve, parameters = self.curves.get(number), self.study.runs[number]
         if curve is None:
             return parameters if isinstance(parameters, str) else ""
         return "; ".join(curve.complaints)
 
-    def _kept(self, task: Task) -> Curve | Task:
+    def _resumed(self, task: Task) -> Curve | Task:
         """The curve of a run that came to its end and can be believed, or what is to be done."""
         try:
             earlier = read_earlier(task.folder, task.run, package_versions()["softehl"])
         except BadInput:  # damaged, or begun by another version
             return replace(task, existing="overwrite")
         status = str(earlier.content.get("status"))
-        if status not in _ENDED or earlier.doubts:
+        if status not in _ENDED or earlier.warnings:
             return task
         complaints = () if _ENDED[status] else (str(earlier.content.get("message")),)
         return Curve(task.run.parameters, task.folder, earlier.rows, complaints)
@@ -363,7 +363,7 @@ class SweepRecord:
                 "allowed: the same, or more points behind them; --overwrite begins anew"
             )
         seconds = content.get("seconds", 0.0)
-        self._before = float(seconds) if isinstance(seconds, int | float) else 0.0
+        self._previous_seconds = float(seconds) if isinstance(seconds, int | float) else 0.0
         return content
 
     def _described(self) -> dict[str, Any]:
@@ -371,7 +371,7 @@ class SweepRecord:
         study = self.study
         described = {
             "case": study.case.reference,
-            "way": study.way,
+            "way": study.scheme,
             "fixed": dict(study.fixed),
             "keys": list(study.keys),
             "points": [list(point.values()) for point in study.points],
@@ -464,11 +464,11 @@ def sweep_study(record: SweepRecord, workers: Workers, *, quiet: bool) -> int:
 
 
 def _run(record: SweepRecord, tasks: Sequence[Task], workers: Workers, *, quiet: bool) -> None:
-    with workers.executor() as executor, _progress(record, quiet=quiet) as told:
+    with workers.executor() as executor, _progress(record, quiet=quiet) as count:
         try:
             for curve in solved(tasks, executor, kept_task):
                 record.add(curve)
-                told()
+                count()
         except BrokenExecutor:
             raise BadInput(
                 "a process was ended from outside (killed, or out of memory); what was reached is "
@@ -483,8 +483,8 @@ def _progress(record: SweepRecord, *, quiet: bool) -> Iterator[Callable[[], None
         yield lambda: None
         return
     total = len(record.study.runs)
-    with make_counter(total - len(record.missing), total) as told:
-        yield told
+    with make_counter(total - len(record.missing), total) as count:
+        yield count
 
 
 def _finish(record: SweepRecord, *, quiet: bool) -> int:

@@ -59,7 +59,7 @@ def rows_table(
         table.add_column(Text(head), justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     for row in ordered:
-        texts = [_shown(row, columns) for columns in heads]
+        texts = [_cell_text(row, columns) for columns in heads]
         if not row.usable:
             texts = [texts[0], *("-" for _ in texts[1:])]
         verdict = row.verdict if row.usable else row.verdict.upper()
@@ -89,10 +89,10 @@ def default_text(key: Key) -> str:
     return "-" if key.default is None else json.dumps(key.default)
 
 
-def key_lines(kind: type[Parameters], known: Collection[Key] = ()) -> list[str]:
+def key_lines(kind: type[Parameters], excluded: Collection[Key] = ()) -> list[str]:
     """The keys of a case as a table for the documentation, without those that are known."""
     lines = ["| key | default | unit | allowed | meaning |", "|---|---|---|---|---|"]
-    listed = [key for key in keys_of(kind) if key not in known]
+    listed = [key for key in keys_of(kind) if key not in excluded]
     for heading, keys in groupby(listed, key=lambda key: key.heading):
         if heading:
             lines.append(_line(f"**{heading}**", "", "", "", ""))
@@ -114,11 +114,11 @@ def _line(*cells: str) -> str:
 
 def _heads(kind: type[Record]) -> list[list[Column]]:
     """The columns that are shown; neighbours under one head together."""
-    shown = [column for column in kind.columns() if column.head]
-    return [list(group) for _, group in groupby(shown, key=lambda column: column.head)]
+    columns = [column for column in kind.columns() if column.head]
+    return [list(group) for _, group in groupby(columns, key=lambda column: column.head)]
 
 
-def _shown(row: Row, columns: Sequence[Column]) -> str:
+def _cell_text(row: Row, columns: Sequence[Column]) -> str:
     return " ".join(column.show(getattr(row, column.name)) for column in columns).strip()
 
 

@@ -88,30 +88,30 @@ def read_quantity(text: str, unit: str) -> float:
 
     Raises ValueError, in words, for a text without a unit of that kind.
     """
-    known, found = _KINDS.get(unit, {unit: 1.0}), _QUANTITY.fullmatch(text)
-    given = found[2].replace("·", " ").replace("*", " ") if found else ""
-    number = float(found[1].replace(",", ".")) if found else 0.0
-    if (given := _spelt(given, known)) in known:
-        return number * known[given]
-    if unit == "degC" and given in _FAHRENHEIT:
+    factors, match = _KINDS.get(unit, {unit: 1.0}), _QUANTITY.fullmatch(text)
+    spelling = match[2].replace("·", " ").replace("*", " ") if match else ""
+    number = float(match[1].replace(",", ".")) if match else 0.0
+    if (spelling := _spelt(spelling, factors)) in factors:
+        return number * factors[spelling]
+    if unit == "degC" and spelling in _FAHRENHEIT:
         return round((number - 32.0) / 1.8, 9)
-    if unit == "MPa s" and given in _KINEMATIC:
+    if unit == "MPa s" and spelling in _KINEMATIC:
         raise ValueError(
             f'"{text}" is a kinematic viscosity; write the dynamic one, which is it times the '
             'density: for an oil of 870 kg/m3, 46 cSt are "40 mPa s"'
         )
-    if found and unit == "mm" and _TOLERANCE_CLASS.fullmatch(given):
+    if match and unit == "mm" and _TOLERANCE_CLASS.fullmatch(spelling):
         raise ValueError(
             f'"{text}" is a size with a tolerance class, which is not read; write the size alone, '
-            f'"{found[1]} mm"'
+            f'"{match[1]} mm"'
         )
-    units = [*known, *(_FAHRENHEIT if unit == "degC" else ())]
+    units = [*factors, *(_FAHRENHEIT if unit == "degC" else ())]
     raise ValueError(f'"{text}" is not a number in {unit}; allowed units: {", ".join(units)}')
 
 
-def _spelt(given: str, known: Collection[str]) -> str:
-    """A unit as it is known: also from capitals or small letters alone, if they mean one unit."""
-    if given in known or (given := _SPELT.get(given, given)) in known:
+def _spelt(given: str, units: Collection[str]) -> str:
+    """A unit as it is units: also from capitals or small letters alone, if they mean one unit."""
+    if given in units or (given := _SPELT.get(given, given)) in units:
         return given
-    same = [unit for unit in known if unit.lower() == given.lower()]
+    same = [unit for unit in units if unit.lower() == given.lower()]
     return same[0] if len(same) == 1 and given in (given.lower(), given.upper()) else given

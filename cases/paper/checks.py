@@ -140,17 +140,17 @@ def leakage(store: Store, scope: Scope) -> Product:
     setups, speeds = _leakage_setups(scope), both(scope.some_speeds())
     rows = []
     for p in setups:
-        kept = [s.row for s in store.states(p, speeds) if s.usable and s.row is not None]
-        rows += net_leakage(kept)
+        usable = [s.row for s in store.states(p, speeds) if s.usable and s.row is not None]
+        rows += net_leakage(usable)
     cells = [row.cells() for row in rows]
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         for p, color in zip(setups, drawing.shades(len(setups)), strict=True):
-            mine = [r for r in rows if r.sealed_pressure_MPa == p.sealed_pressure]
-            u, net = [r.speed_mm_s for r in mine], [r.net_film_um for r in mine]
+            selected = [r for r in rows if r.sealed_pressure_MPa == p.sealed_pressure]
+            u, net = [r.speed_mm_s for r in selected], [r.net_film_um for r in selected]
             axes.plot(u, net, color=color, label=f"$p_s$ = {p.sealed_pressure:g} MPa")
-            for r in mine:
+            for r in selected:
                 face = color if r.verdict == "ok" else "white"
                 point = ([r.speed_mm_s], [r.net_film_um])
                 axes.plot(*point, marker="o", color=color, markerfacecolor=face)
@@ -159,8 +159,8 @@ def leakage(store: Store, scope: Scope) -> Product:
         axes.set_ylabel(r"$h^*_\mathrm{out} - h^*_\mathrm{in}$ [$\mu$m]")
         axes.legend()
 
-    words = " What leaves in a cycle per unit of stroke and area; positive: the seal leaks."
-    caption = density_words(scope.mesh(16), 16) + words + " Hollow: not ok."
+    note = " What leaves in a cycle per unit of stroke and area; positive: the seal leaks."
+    caption = density_words(scope.mesh(16), 16) + note + " Hollow: not ok."
     return Product({"leakage": Table(LeakageRow.header(), cells)}, caption, draw, (4.6, 3.2))
 
 
@@ -189,8 +189,8 @@ def shear(store: Store, scope: Scope) -> Product:
         shift, largest = _movement(a, b)
         films = [a.row.h_star_um, b.row.h_star_um, 100 * (a.row.h_star_um / b.row.h_star_um - 1)]
         minima = 100 * (a.row.h_min_um / b.row.h_min_um - 1)
-        ends = [1e3 * (getattr(a.row, k) - getattr(b.row, k)) for k in _ENDS]
-        rows.append([u, a.verdict, b.verdict, largest, shift, *ends, *films, minima])
+        shifts = [1e3 * (getattr(a.row, k) - getattr(b.row, k)) for k in _ENDS]
+        rows.append([u, a.verdict, b.verdict, largest, shift, *shifts, *films, minima])
     header = (
         *("rod_speed_mm_s", "verdict_with", "verdict_without"),
         *("largest_movement_um", "mean_axial_movement_of_contact_um"),
@@ -219,9 +219,9 @@ def _movement(a: State, b: State) -> tuple[float, float]:
 
 def _section(state: State) -> str:
     assert state.row is not None
-    assert state.place is not None
+    assert state.folder is not None
     _, section = state.row.file_names()
-    return str(state.place / section)
+    return str(state.folder / section)
 
 
 ITEMS = (
@@ -357,8 +357,8 @@ def arc(store: Store, scope: Scope) -> Product:
         *("scheme", "arc_start", "arc_end", "rod_speed_mm_s"),
         *("h_star_um", "change_percent", "verdict"),
     )
-    words = f" p_s = {scope.pressure(1.0):g} MPa; changes against the first arc."
-    return Product({"arc": Table(header, rows)}, density_words(scope.mesh(16), 16) + words)
+    note = f" p_s = {scope.pressure(1.0):g} MPa; changes against the first arc."
+    return Product({"arc": Table(header, rows)}, density_words(scope.mesh(16), 16) + note)
 
 
 # --- the outstroke without cavitation -----------------------------------------------------------
@@ -382,9 +382,9 @@ def cavitation(store: Store, scope: Scope) -> Product:
     for pair in _cavitation_setups(scope):
         for u in scope.some_speeds(CAVITATING):
             states = [store.state(p, u) for p in pair]
-            least = [float(s.profile.p_MPa.min()) if s.usable else nan for s in states]
+            minima = [float(s.profile.p_MPa.min()) if s.usable else nan for s in states]
             verdicts = [s.verdict for s in states]
-            row: list[Cell] = [pair[0].sealed_pressure, u, *least, *(s.h_star for s in states)]
+            row: list[Cell] = [pair[0].sealed_pressure, u, *minima, *(s.h_star for s in states)]
             rows.append([*row, *_changes(states), *verdicts])
     header = (
         *("sealed_pressure_MPa", "rod_speed_mm_s", "least_p_MPa", "least_p_without_MPa"),

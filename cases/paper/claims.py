@@ -63,8 +63,8 @@ def _refinement(query: Query) -> Finding:
     values = [_index(query, d, 1.0, 400.0) for d in densities]
     text = f"densities {numbers(densities)}: ripple {numbers(rises, '.2g')} h*, "
     fine = [rise for d, rise in zip(densities, rises, strict=True) if d >= 4]
-    words = f"{text}index of the mid contact {numbers(values, '.2g')}"
-    return Finding(words, max(fine) < RIPPLE if fine else None)
+    message = f"{text}index of the mid contact {numbers(values, '.2g')}"
+    return Finding(message, max(fine) < RIPPLE if fine else None)
 
 
 def _dip(query: Query) -> Finding:
@@ -77,20 +77,22 @@ def _dip(query: Query) -> Finding:
 
 
 def _high_orders(query: Query) -> Finding:
-    d, off = query.scope.mesh(2, 2), []
+    d, errors = query.scope.mesh(2, 2), []
     for kind in ("fe", "dg"):
         pair = [query.state(d, 1.0, 400.0, reynolds=kind, pressure_order=m) for m in (5, 4)]
-        off.append(100.0 * difference(pair[0], pair[1]) / query.row(d, 1.0, 400.0).p_max_MPa)
-    text = f"m_p = 4 against 5: at most {numbers(off, '.2g')} % of p_max (FE, DG)"
-    return Finding(text, max(off) < 2.0)
+        errors.append(100.0 * difference(pair[0], pair[1]) / query.row(d, 1.0, 400.0).p_max_MPa)
+    text = f"m_p = 4 against 5: at most {numbers(errors, '.2g')} % of p_max (FE, DG)"
+    return Finding(text, max(errors) < 2.0)
 
 
 def _jumps(query: Query) -> Finding:
     d = query.scope.mesh(2, 2)
     rows = [query.state(d, 1.0, 400.0, reynolds="dg", pressure_order=m).row for m in ORDERS]
     values = [r.pressure_jump_max_MPa if r else float("nan") for r in rows]
-    found = counted(list(zip(values[1:], values, strict=False)), "falls with m_p")
-    return Finding(f"{numbers(values, '.2g')} MPa for m_p = 1 to 5; {found.text}", found.holds)
+    comparison = counted(list(zip(values[1:], values, strict=False)), "falls with m_p")
+    return Finding(
+        f"{numbers(values, '.2g')} MPa for m_p = 1 to 5; {comparison.text}", comparison.holds
+    )
 
 
 def _dg_no_better(query: Query) -> Finding:
@@ -128,8 +130,8 @@ def _onset_by_density(query: Query) -> Finding:
 def _more_at_low_speed(query: Query) -> Finding:
     d = query.scope.mesh(16)
     values = [ripple(query.state(d, 5.0, u)) for u in _FALLING]
-    found = counted(_seen(itertools.pairwise(values)), "halvings over which it grows")
-    return Finding(f"ripple {numbers(values, '.2g')} h*; {found.text}", found.holds)
+    comparison = counted(_seen(itertools.pairwise(values)), "halvings over which it grows")
+    return Finding(f"ripple {numbers(values, '.2g')} h*; {comparison.text}", comparison.holds)
 
 
 def _severe(query: Query) -> Finding:
@@ -137,9 +139,9 @@ def _severe(query: Query) -> Finding:
     values = [ripple(query.state(d, p, s * 200.0)) for p in (1.0, 5.0) for s in (1.0, -1.0)]
     text = f"ripple at |U| = 200: p_s 1 out {values[0]:.2g} in {values[1]:.2g} h*;"
     pairs = [(values[0], values[1]), (values[0], values[2]), (values[1], values[3])]
-    found = counted(_seen(pairs), "comparisons that hold")
+    comparison = counted(_seen(pairs), "comparisons that hold")
     return Finding(
-        f"{text} p_s 5 out {values[2]:.2g} in {values[3]:.2g}; {found.text}", found.holds
+        f"{text} p_s 5 out {values[2]:.2g} in {values[3]:.2g}; {comparison.text}", comparison.holds
     )
 
 
@@ -150,15 +152,15 @@ def _seen(pairs: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
 
 def _mild_oscillations(query: Query) -> Finding:
     densities = query.scope.meshes((4, 8, 16), default=8)
-    off: dict[bool, list[float]] = {True: [], False: []}
+    errors: dict[bool, list[float]] = {True: [], False: []}
     for u in _FALLING:
         coarse, fine = (query.state(d, 5.0, u) for d in (densities[0], densities[-1]))
         change = 100.0 * (coarse.h_star / fine.h_star - 1.0)
         if coarse.verdict == "oscillating" and densities[-1] > densities[0] and isfinite(change):
-            off[_index(query, densities[0], 5.0, u) < MILD].append(change)
-    mild, severe = (numbers(off[which], "+.2f") or "-" for which in (True, False))
+            errors[_index(query, densities[0], 5.0, u) < MILD].append(change)
+    mild, severe = (numbers(errors[which], "+.2f") or "-" for which in (True, False))
     text = f"h* of density {densities[0]} against {densities[-1]}: {mild} % where the index is "
-    holds = max(map(abs, off[True])) < 1.0 if off[True] else None
+    holds = max(map(abs, errors[True])) < 1.0 if errors[True] else None
     return Finding(f"{text}below {MILD:g}, {severe} % above", holds)
 
 
@@ -185,10 +187,10 @@ def _order_2(query: Query) -> Finding:
 
 def _order_3(query: Query) -> Finding:
     errors = mesh_errors(query, query.scope.mesh(2, 2), [3, 4, 5])
-    known = all(isfinite(e) for e in errors)
+    finite = all(isfinite(e) for e in errors)
     return Finding(
         f"{numbers(errors, '+.2f')} % for m_p = 3, 4, 5",
-        max(map(abs, errors)) < 0.3 if known else None,
+        max(map(abs, errors)) < 0.3 if finite else None,
     )
 
 
@@ -196,22 +198,24 @@ def _dg_worse(query: Query) -> Finding:
     d = query.scope.mesh(2, 2)
     fe, dg = mesh_errors(query, d, ORDERS), mesh_errors(query, d, ORDERS, reynolds="dg")
     text = f"density {d}, m_p = 1 to 5: FE {numbers(fe, '+.2f')} %, DG {numbers(dg, '+.2f')} %"
-    held, known = (lambda pairs: (sum(abs(a) < abs(b) for a, b in pairs), len(pairs)))(
+    count, total = (lambda pairs: (sum(abs(a) < abs(b) for a, b in pairs), len(pairs)))(
         [(a, b) for a, b in zip(fe, dg, strict=True) if isfinite(a) and isfinite(b)]
     )
-    return Finding(f"{text}; FE closer for {held} of {known}", held > known / 2 if known else None)
+    return Finding(
+        f"{text}; FE closer for {count} of {total}", count > total / 2 if total else None
+    )
 
 
 def _dg_agrees(query: Query) -> Finding:
-    d, off = query.scope.mesh(8), []
+    d, errors = query.scope.mesh(8), []
     for sign in (1.0, -1.0):
         for u in _FALLING:
             a, b = query.h(d, 5.0, sign * u, reynolds="dg"), query.h(d, 5.0, sign * u)
-            off.append(100.0 * (a / b - 1.0))
-    text = f"h* DG against FE, density {d}, p_s = 5: out {numbers(off[:6], '+.2f')}, in "
-    known = [x for x in off if isfinite(x)]
+            errors.append(100.0 * (a / b - 1.0))
+    text = f"h* DG against FE, density {d}, p_s = 5: out {numbers(errors[:6], '+.2f')}, in "
+    finite = [x for x in errors if isfinite(x)]
     return Finding(
-        f"{text}{numbers(off[6:], '+.2f')} %", max(map(abs, known)) < 1.0 if known else None
+        f"{text}{numbers(errors[6:], '+.2f')} %", max(map(abs, finite)) < 1.0 if finite else None
     )
 
 
@@ -223,16 +227,16 @@ def _solids(query: Query) -> Finding:
     ]
     text = f"errors of h* at densities {numbers(densities)}: Taylor {numbers(rows[0], '+.2f')} %, "
     pairs = [(abs(a), abs(b)) for a, b in zip(*rows, strict=True)]
-    found = counted(pairs, "Taylor closer")
-    return Finding(f"{text}F-bar {numbers(rows[1], '+.2f')} %; {found.text}", found.holds)
+    comparison = counted(pairs, "Taylor closer")
+    return Finding(f"{text}F-bar {numbers(rows[1], '+.2f')} %; {comparison.text}", comparison.holds)
 
 
 def _solids_oscillate_alike(query: Query) -> Finding:
     d = query.scope.mesh(2, 2)
     values = [_index(query, d, 1.0, 400.0, solid=s) for s in ("taylor", "fbar")]
     text = f"density {d}: index {numbers(values, '.3g')} (Taylor, F-bar)"
-    known = all(isfinite(v) for v in values)
-    return Finding(text, abs(values[0] - values[1]) < VISIBLE if known else None)
+    finite = all(isfinite(v) for v in values)
+    return Finding(text, abs(values[0] - values[1]) < VISIBLE if finite else None)
 
 
 def _quadrature(query: Query) -> Finding:
@@ -240,15 +244,15 @@ def _quadrature(query: Query) -> Finding:
     matters: list[bool] = []
     same: list[bool] = []
     for d in query.scope.meshes((1, 2, 4)):
-        off = []
+        errors = []
         for m in (1, 2, 4):
             a, b = (
                 query.h(d, 1.0, 400.0, pressure_order=m, quadrature=q) for q in ("lobatto", "gauss")
             )
-            off.append(100.0 * (a / b - 1.0))
+            errors.append(100.0 * (a / b - 1.0))
             where = matters if d < 4 and m <= 2 else same
-            where += [abs(off[-1]) > SAME] if isfinite(off[-1]) else []
-        cells.append(f"density {d}: {numbers(off, '+.2f')}")
+            where += [abs(errors[-1]) > SAME] if isfinite(errors[-1]) else []
+        cells.append(f"density {d}: {numbers(errors, '+.2f')}")
     text = f"Lobatto against Gauss, m_p = 1, 2, 4: {'; '.join(cells)} %"
     return Finding(text, any(matters) and not any(same) if matters and same else None)
 
@@ -256,9 +260,9 @@ def _quadrature(query: Query) -> Finding:
 def _quadrature_oscillates_alike(query: Query) -> Finding:
     d = query.scope.mesh(2, 2)
     values = [_index(query, d, 1.0, 400.0, quadrature=q) for q in ("gauss", "lobatto")]
-    known = all(isfinite(v) for v in values)
+    finite = all(isfinite(v) for v in values)
     text = f"density {d}: index {numbers(values, '.3g')} (Gauss, Lobatto)"
-    return Finding(text, abs(values[0] - values[1]) < VISIBLE if known else None)
+    return Finding(text, abs(values[0] - values[1]) < VISIBLE if finite else None)
 
 
 MESH: tuple[tuple[str, str, Measure], ...] = (
@@ -297,42 +301,42 @@ _LAYERS = (5.0, 20.0)
 
 def _unknowns(query: Query) -> Finding:
     densities = table_2_densities(query.scope)
-    ours = [unknowns(d)[0] for d in densities]
-    off = [100.0 * (n / TABLE_2[d][0] - 1.0) for d, n in zip(densities, ours, strict=True)]
-    text = f"{', '.join(map(str, ours))}: {numbers(off, '+.2f')} %"
-    return Finding(text, all(x == 0.0 for x in off))
+    counts = [unknowns(d)[0] for d in densities]
+    errors = [100.0 * (n / TABLE_2[d][0] - 1.0) for d, n in zip(densities, counts, strict=True)]
+    text = f"{', '.join(map(str, counts))}: {numbers(errors, '+.2f')} %"
+    return Finding(text, all(x == 0.0 for x in errors))
 
 
 def _pressure_unknowns(query: Query) -> Finding:
     densities = table_2_densities(query.scope)
-    ours = [unknowns(d)[1] for d in densities]
-    return Finding(", ".join(map(str, ours)), ours == [TABLE_2[d][1] for d in densities])
+    counts = [unknowns(d)[1] for d in densities]
+    return Finding(", ".join(map(str, counts)), counts == [TABLE_2[d][1] for d in densities])
 
 
 def _zone_expands(query: Query) -> Finding:
     density = query.scope.mesh(2, 2)
-    ends = []
+    limits = []
     for p_s in query.scope.some_pressures(FIG_4_PRESSURES):
         row = query.row(density, p_s, 400.0)
-        ends.append((row.contact_start_mm, row.contact_end_mm))
-    starts, stops = zip(*ends, strict=True)
+        limits.append((row.contact_start_mm, row.contact_end_mm))
+    starts, stops = zip(*limits, strict=True)
     moved = (max(starts) - min(starts), stops[-1] - stops[0])
     text = f"air end {numbers(stops)} mm, sealed end {numbers(starts)} mm over p_s"
-    if len(ends) < 2:
+    if len(limits) < 2:
         return Finding(text, None)
     return Finding(text, list(stops) == sorted(stops) and moved[0] < 0.25 * moved[1])
 
 
 def _minimum_at_outlet(query: Query) -> Finding:
-    shares = []
+    fractions = []
     for sign in (1.0, -1.0):
         row = query.row(query.density, 1.0, sign * 100.0)
         profile = query.state(query.density, 1.0, sign * 100.0).profile
         x = float(profile.x_mm[int(np.argmin(profile.h_um))])
         inside = row.contact_end_mm - x if sign > 0 else x - row.contact_start_mm
-        shares.append(100.0 * inside / (row.contact_end_mm - row.contact_start_mm))
-    text = f"{numbers(shares)} % of the width (h < 20 um) from the outlet end (out, in)"
-    return Finding(text, all(0.0 <= share < 10.0 for share in shares))
+        fractions.append(100.0 * inside / (row.contact_end_mm - row.contact_start_mm))
+    text = f"{numbers(fractions)} % of the width (h < 20 um) from the outlet end (out, in)"
+    return Finding(text, all(0.0 <= share < 10.0 for share in fractions))
 
 
 def _pressure_drop(query: Query) -> Finding:
@@ -340,8 +344,8 @@ def _pressure_drop(query: Query) -> Finding:
     out = query.state(query.density, p_s, 100.0).profile
     back = query.state(query.density, p_s, -100.0)
     row, profile = query.row(query.density, p_s, -100.0), back.profile
-    near = np.abs(profile.x_mm - row.contact_start_mm) < 0.1
-    drop = p_s - float(profile.p_MPa[near].min())
+    vicinity = np.abs(profile.x_mm - row.contact_start_mm) < 0.1
+    drop = p_s - float(profile.p_MPa[vicinity].min())
     text = (
         f"instroke: p falls {drop:.2f} MPa below p_s at the sealed end; outstroke: least p "
         f"{float(out.p_MPa.min()):.1e} MPa"
@@ -378,17 +382,19 @@ def _thinner_instroke(query: Query) -> Finding:
 
 
 def _falls_with_speed(query: Query) -> Finding:
-    d, slopes = query.density, []
+    d, exponents = query.density, []
     fast, slow = query.speeds[0], query.speeds[-1]
     for p in query.pressures:
         for sign in (1.0, -1.0):
             films = [(u, query.h(d, p, sign * u)) for u in (fast, slow)]
             if fast > slow and all(isfinite(h) for _, h in films):
-                slopes.append(log(films[0][1] / films[1][1]) / log(fast / slow))
-    if not slopes:
+                exponents.append(log(films[0][1] / films[1][1]) / log(fast / slow))
+    if not exponents:
         return Finding("not measured", None)
-    text = f"h* ~ |U|^n with n = {min(slopes):.3f} to {max(slopes):.3f} between the end speeds"
-    return Finding(text, min(slopes) > 0.3)
+    text = (
+        f"h* ~ |U|^n with n = {min(exponents):.3f} to {max(exponents):.3f} between the end speeds"
+    )
+    return Finding(text, min(exponents) > 0.3)
 
 
 def _with_sealed_pressure(sign: float) -> Measure:
@@ -398,9 +404,11 @@ def _with_sealed_pressure(sign: float) -> Measure:
             films = [query.h(d, p, sign * u) for p in query.pressures]
             pairs += [(a, b) if sign > 0 else (b, a) for a, b in itertools.pairwise(films)]
         word = "rises" if sign > 0 else "falls"
-        found = counted(pairs, f"steps of p_s over which h* {word}")
+        comparison = counted(pairs, f"steps of p_s over which h* {word}")
         films = [query.h(d, p, sign * 400.0) for p in query.pressures]
-        return Finding(f"{found.text}; h* at |U| = 400: {numbers(films, '.4g')} um", found.holds)
+        return Finding(
+            f"{comparison.text}; h* at |U| = 400: {numbers(films, '.4g')} um", comparison.holds
+        )
 
     return measure
 
@@ -421,14 +429,14 @@ def _less(a: float, b: float) -> bool | None:
 
 
 def _h_star_at_maximum(query: Query) -> Finding:
-    off = []
+    errors = []
     for sign in (1.0, -1.0):
         state = query.state(query.density, 1.0, sign * 400.0)
         profile = state.profile
         h = float(profile.h_um[int(np.argmax(profile.p_MPa))])
-        off.append(100.0 * (h / state.h_star - 1.0))
+        errors.append(100.0 * (h / state.h_star - 1.0))
     return Finding(
-        f"h there differs from q/u by {numbers(off, '+.2g')} %", max(map(abs, off)) < 1.0
+        f"h there differs from q/u by {numbers(errors, '+.2g')} %", max(map(abs, errors)) < 1.0
     )
 
 
@@ -457,12 +465,13 @@ def _zones_shrink(query: Query) -> Finding:
 
 
 def _near_contact(query: Query) -> Finding:
-    off, p_s = [], query.scope.pressure(1.0)
+    errors, p_s = [], query.scope.pressure(1.0)
     for sign in (1.0, -1.0):
         row = query.row(query.density, p_s, sign * 100.0)
-        off.append(100.0 * (row.p_max_MPa / row.contact_p_max_MPa - 1.0))
+        errors.append(100.0 * (row.p_max_MPa / row.contact_p_max_MPa - 1.0))
     return Finding(
-        f"largest pressure against dry contact: {numbers(off, '+.2f')} %", max(map(abs, off)) < 2.0
+        f"largest pressure against dry contact: {numbers(errors, '+.2f')} %",
+        max(map(abs, errors)) < 2.0,
     )
 
 
@@ -485,8 +494,8 @@ def _thin(query: Query) -> Finding:
         for u in query.speeds
         for s in (1.0, -1.0)
     ]
-    least = min(row.h_star_um for row in rows if row is not None and row.verdict == "ok")
-    return Finding(f"smallest h* with verdict ok: {least:.3f} um", least < 1.0)
+    minimum = min(row.h_star_um for row in rows if row is not None and row.verdict == "ok")
+    return Finding(f"smallest h* with verdict ok: {minimum:.3f} um", minimum < 1.0)
 
 
 def _shear(query: Query) -> Finding:
@@ -498,10 +507,12 @@ def _shear(query: Query) -> Finding:
     if not changes:
         return Finding("no state with the verdict ok", None)
     (error,) = mesh_errors(query, d, [4])
-    ends = min(changes), max(changes)
-    text = f"with it h* changes by {numbers(ends, '+.2f')} % (down, up); h* is {error:+.2f} % off"
-    known = isfinite(error)
-    return Finding(f"{text} itself", max(map(abs, ends)) > 2.0 * abs(error) if known else None)
+    extremes = min(changes), max(changes)
+    text = (
+        f"with it h* changes by {numbers(extremes, '+.2f')} % (down, up); h* is {error:+.2f} % off"
+    )
+    finite = isfinite(error)
+    return Finding(f"{text} itself", max(map(abs, extremes)) > 2.0 * abs(error) if finite else None)
 
 
 def _barus_30(query: Query) -> Finding:
@@ -523,29 +534,28 @@ def _piezo(sign: float) -> Measure:
             b = query.h(d, p, sign * 100.0, pressure_viscosity=0.0)
             changes.append(100.0 * (a / b - 1.0))
         text = f"p_s {numbers(query.pressures)}: {numbers(changes, '+.2f')} %"
-        known = [c for c in changes if isfinite(c)]
+        finite = [c for c in changes if isfinite(c)]
         if sign > 0:
             return Finding(
-                text, known == sorted(known) and known[-1] > 1.0 if len(known) > 1 else None
+                text, finite == sorted(finite) and finite[-1] > 1.0 if len(finite) > 1 else None
             )
-        return Finding(text, max(map(abs, known)) < 1.0 if known else None)
+        return Finding(text, max(map(abs, finite)) < 1.0 if finite else None)
 
     return measure
 
 
 def _piezo_pressure(query: Query) -> Finding:
-    d, off = query.density, []
+    d, errors = query.density, []
     for sign in (1.0, -1.0):
         query.row(d, 5.0, sign * 100.0)
         pair = (
             query.state(d, 5.0, sign * 100.0, pressure_viscosity=0.0),
             query.state(d, 5.0, sign * 100.0),
         )
-        off.append(difference(*pair, margin=0.1) / query.row(d, 5.0, sign * 100.0).p_max_MPa)
-    text = (
-        f"largest difference in the mid contact {numbers([100 * x for x in off], '.2g')} % of p_max"
-    )
-    return Finding(text, max(off) < 0.01)
+        errors.append(difference(*pair, margin=0.1) / query.row(d, 5.0, sign * 100.0).p_max_MPa)
+    percent = numbers([100 * x for x in errors], ".2g")
+    text = f"largest difference in the mid contact {percent} % of p_max"
+    return Finding(text, max(errors) < 0.01)
 
 
 FILM: tuple[tuple[str, str, Measure], ...] = (
@@ -605,8 +615,8 @@ _SOURCES: Sequence[Item] = (
 class Statement:
     """A statement: where the paper makes it, what it says, and how it is measured."""
 
-    place: str
-    words: str
+    reference: str
+    text: str
     measure: Callable[[Query], Finding]
 
 
@@ -626,8 +636,8 @@ def statements(store: Store, scope: Scope) -> Product:
             finding = statement.measure(query)
         except ValueError as error:  # a state that it needs was not reached
             finding = Finding(str(error), None)
-        words = WORDS[finding.holds]
-        rows.append((str(number), statement.place, statement.words, finding.text, words))
+        verdict = WORDS[finding.holds]
+        rows.append((str(number), statement.reference, statement.text, finding.text, verdict))
     header = ("number", "place", "statement", "measured", "holds")
     caption = "Measured from the runs of the other items."
     return Product({"statements": Table(header, rows)}, caption)

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper import drawing
 from softehl.cases.paper.drawing import Line
-from softehl.cases.paper.figure_spec import Item, Product, Scope, density_words, doubts, state_table
+from softehl.cases.paper.figure_spec import (
+    Item,
+    Product,
+    Scope,
+    density_words,
+    state_table,
+    verdict_note,
+)
 from softehl.cases.paper.states import Request, Store, ask, setup
 from softehl.cases.seal.gland.records import DENSITIES
 
@@ -57,10 +64,10 @@ def chart_item(name: str, title: str, chart: Callable[[Scope], Chart]) -> Item:
 
 
 def _product(name: str, chart: Chart, store: Store) -> Product:
-    found = [
+    states_by_series = [
         (s, [store.state(r.setup, u) for r in s.requests for u in r.speeds]) for s in chart.series
     ]
-    states = [state for _, some in found for state in some]
+    states = [state for _, some in states_by_series for state in some]
 
     def draw(figure: Figure) -> None:
         panels = figure.subplots(1, len(chart.titles), squeeze=False, sharey=True)[0]
@@ -68,7 +75,7 @@ def _product(name: str, chart: Chart, store: Store) -> Product:
         for axes, title in zip(panels, chart.titles, strict=True):
             axes.set_title(title)
             axes.set_xlabel(chart.abscissa)
-        for s, some in found:
+        for s, some in states_by_series:
             line = Line(s.label, s.x, some, colors[s.shade], s.style)
             drawing.draw_line(panels[s.panel], line)
         panels[0].set_ylabel(drawing.H_STAR)
@@ -76,9 +83,9 @@ def _product(name: str, chart: Chart, store: Store) -> Product:
             drawing.logarithmic(axes, x=chart.log_x, y=chart.log_y)
             axes.legend(ncols=2)
 
-    table = state_table([(s.label, state) for s, some in found for state in some])
+    table = state_table([(s.label, state) for s, some in states_by_series for state in some])
     marks = "" if all(s.plain for s in states) else f" {drawing.marks_words()}"
-    caption = chart.caption + marks + doubts(states)
+    caption = chart.caption + marks + verdict_note(states)
     return Product({name: table}, caption, draw, (3.6 * len(chart.titles) + 1.4, 3.6))
 
 
@@ -96,8 +103,8 @@ def fig_9(scope: Scope) -> Chart:
         for shade, u in enumerate(scope.some_speeds(SPEEDS))
         for sign, style in ((1.0, "--"), (-1.0, "-"))
     ]
-    words = " Instroke full, outstroke dashed; which speeds the paper shows is not in its text."
-    caption = density_words(density, 16) + words
+    note = " Instroke full, outstroke dashed; which speeds the paper shows is not in its text."
+    caption = density_words(density, 16) + note
     return Chart([""], series, "sealed pressure $p_s$ [MPa]", caption, log_y=True)
 
 
@@ -116,8 +123,8 @@ def _figure_16_state(scope: Scope) -> tuple[tuple[int, ...], float, float]:
 
 def _density_caption(scope: Scope, more: str = "") -> str:
     densities, u, p_s = _figure_16_state(scope)
-    words = f" Outstroke, p_s = {p_s:g} MPa, U = {u:g} mm/s.{more}"
-    return density_words(densities, DENSITIES) + words
+    note = f" Outstroke, p_s = {p_s:g} MPa, U = {u:g} mm/s.{more}"
+    return density_words(densities, DENSITIES) + note
 
 
 def fig_16(scope: Scope) -> Chart:

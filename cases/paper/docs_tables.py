@@ -25,8 +25,8 @@ def renewed(text: str, folder: Path) -> str:
         if kind == "caption":
             body = (folder / f"{name}.txt").read_text(encoding="utf-8").strip()
         else:
-            wanted = [c.strip() for c in columns.split(",")] if columns else []
-            body = markdown(folder / f"{name}.csv", wanted)
+            selection = [c.strip() for c in columns.split(",")] if columns else []
+            body = markdown(folder / f"{name}.csv", selection)
         return f"{begin}\n{body}\n\n{end}"
 
     return _BLOCK.sub(block, text)
@@ -39,11 +39,11 @@ def markdown(path: Path, columns: list[str]) -> str:
     for name in columns:
         if name not in header:
             raise ValueError(f"{path}: no column {name!r}; allowed: {', '.join(header)}")
-    chosen = [header.index(name) for name in columns or header]
+    indices = [header.index(name) for name in columns or header]
     lines = [
-        "| " + " | ".join(header[i] for i in chosen) + " |",
-        "|" + "---|" * len(chosen),
-        *("| " + " | ".join(_cell(header[i], row[i]) for i in chosen) + " |" for row in rows),
+        "| " + " | ".join(header[i] for i in indices) + " |",
+        "|" + "---|" * len(indices),
+        *("| " + " | ".join(_cell(header[i], row[i]) for i in indices) + " |" for row in rows),
     ]
     return "\n".join(lines)
 
@@ -72,8 +72,8 @@ def main(arguments: list[str]) -> None:
     for page in map(Path, arguments[1:] or PAGES):
         text = renewed(page.read_text(encoding="utf-8"), folder)
         write_text(page, text)
-        for place in _PICTURE.findall(text):
-            target = page.parent / place
+        for picture in _PICTURE.findall(text):
+            target = page.parent / picture
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(folder / target.name, target)
 

@@ -165,6 +165,6 @@ def around_contact(
     end = max(r.contact_end_mm for r in rows)
     first, last = (start, -_MARGIN), (end, _MARGIN)
     if around:
-        place = start if around[0] == "start" else end
-        first, last = (place, around[1]), (place, around[2])
+        end_position = start if around[0] == "start" else end
+        first, last = (end_position, around[1]), (end_position, around[2])
     axes.set_xlim(sum(first), sum(last))

@@ -38,25 +38,25 @@ class Scope:
         finest = self.density or default
         return tuple(d for d in paper if d <= finest) or (finest,)
 
-    def speed(self, wanted: float) -> float:
+    def speed(self, target: float) -> float:
         """The speed |U| that stands for a single one of the paper."""
-        return _nearest(wanted, self.speeds)
+        return _nearest(target, self.speeds)
 
-    def some_speeds(self, wanted: Sequence[float] = SPEEDS) -> tuple[float, ...]:
+    def some_speeds(self, targets: Sequence[float] = SPEEDS) -> tuple[float, ...]:
         """The speeds |U| that stand for several of the paper, falling."""
-        return tuple(sorted({self.speed(u) for u in wanted}, reverse=True))
+        return tuple(sorted({self.speed(u) for u in targets}, reverse=True))
 
-    def some_pressures(self, wanted: Sequence[float]) -> tuple[float, ...]:
+    def some_pressures(self, targets: Sequence[float]) -> tuple[float, ...]:
         """The sealed pressures that stand for several of the paper, rising."""
-        return tuple(sorted({_nearest(p, self.pressures) for p in wanted}))
+        return tuple(sorted({_nearest(p, self.pressures) for p in targets}))
 
-    def pressure(self, wanted: float) -> float:
+    def pressure(self, target: float) -> float:
         """The sealed pressure that stands for a single one of the paper."""
-        return _nearest(wanted, self.pressures)
+        return _nearest(target, self.pressures)
 
 
-def _nearest(wanted: float, allowed: Sequence[float] | None) -> float:
-    return min(allowed, key=lambda value: abs(value - wanted)) if allowed else wanted
+def _nearest(target: float, allowed: Sequence[float] | None) -> float:
+    return min(allowed, key=lambda value: abs(value - target)) if allowed else target
 
 
 @dataclass(frozen=True)
@@ -132,23 +132,30 @@ def profile_table(series: Sequence[tuple[str, State]]) -> Table:
 
 def density_words(used: int | Sequence[int], paper: int | Sequence[int]) -> str:
     """ "Mesh density 4 (paper: 16)."."""
-    ours, theirs = (_listed(x) for x in (used, paper))
-    return f"Mesh density {ours}." if ours == theirs else f"Mesh density {ours} (paper: {theirs})."
+    used_text, paper_text = (_join_densities(x) for x in (used, paper))
+    return (
+        f"Mesh density {used_text}."
+        if used_text == paper_text
+        else f"Mesh density {used_text} (paper: {paper_text})."
+    )
 
 
-def doubts(states: Sequence[State]) -> str:
+def verdict_note(states: Sequence[State]) -> str:
     """The states whose verdict is not ok, by verdict; empty if there are none."""
-    found: dict[str, list[str]] = {}
+    names_by_verdict: dict[str, list[str]] = {}
     for state in states:
         if not state.plain:
-            found.setdefault(state.verdict, []).append(_short(state, states))
-    named = [f"{verdict}: {', '.join(dict.fromkeys(names))}" for verdict, names in found.items()]
+            names_by_verdict.setdefault(state.verdict, []).append(_short(state, states))
+    named = [
+        f"{verdict}: {', '.join(dict.fromkeys(names))}"
+        for verdict, names in names_by_verdict.items()
+    ]
     return f" Marked, because not ok - {'; '.join(named)}." if named else ""
 
 
 def _short(state: State, among: Sequence[State]) -> str:
     """A state in as few words as tell it from the others."""
-    words = [f"U {state.rod_speed:+g}"]
+    parts = [f"U {state.rod_speed:+g}"]
     others: list[tuple[str, str]] = [
         ("sealed_pressure", "p_s"),
         ("density", "d"),
@@ -161,11 +168,11 @@ def _short(state: State, among: Sequence[State]) -> str:
     for key, symbol in others:
         if len({getattr(s.setup, key) for s in among}) > 1:
             value = getattr(state.setup, key)
-            words.append(f"{symbol} {value:g}" if symbol else str(value))
-    return " ".join(words)
+            parts.append(f"{symbol} {value:g}" if symbol else str(value))
+    return " ".join(parts)
 
 
-def _listed(densities: int | Sequence[int]) -> str:
+def _join_densities(densities: int | Sequence[int]) -> str:
     return ", ".join(map(str, [densities] if isinstance(densities, int) else densities))
 
 

@@ -36,9 +36,9 @@ def largest_inlet_gradient(x: Array, p: Array, p_ring: Oil, outstroke: bool) -> 
         x, p = -x[::-1], p[::-1]
     top = int(np.argmax(p)) + 1
     x, p = x[:top], p[:top]
-    apart = np.diff(x) > 1e-9  # a facet of discontinuous pressures has two rows
-    slope = np.diff(p)[apart] / np.diff(x)[apart]
-    middle = 0.5 * (p[1:] + p[:-1])[apart]
+    separate = np.diff(x) > 1e-9  # a facet of discontinuous pressures has two rows
+    slope = np.diff(p)[separate] / np.diff(x)[separate]
+    middle = 0.5 * (p[1:] + p[:-1])[separate]
     eta = p_ring.viscosity * np.exp(p_ring.pressure_viscosity * middle)
     return float((slope / eta).max()) if len(slope) else nan
 
@@ -74,14 +74,14 @@ def inverse(store: Store, scope: Scope) -> Product:
 
 def _row(store: Store, state: State) -> list[Cell]:
     ring, u = state.setup, state.rod_speed
-    dry, own = nan, nan
+    dry, film = nan, nan
     contact = store.contact(ring)
     if contact is not None:
         dry = film_of(largest_inlet_gradient(*contact, ring, u > 0), u)
     if state.usable:
         profile = state.profile
-        own = film_of(largest_inlet_gradient(profile.x_mm, profile.p_MPa, ring, u > 0), u)
-    return [ring.sealed_pressure, u, ring.density, state.verdict, state.h_star, dry, own]
+        film = film_of(largest_inlet_gradient(profile.x_mm, profile.p_MPa, ring, u > 0), u)
+    return [ring.sealed_pressure, u, ring.density, state.verdict, state.h_star, dry, film]
 
 
 ITEMS = (Item("inverse", "Inverse hydrodynamic theory", inverse, _requests),)

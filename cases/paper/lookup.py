@@ -68,14 +68,14 @@ Measure = Callable[[Query], Finding]
 
 def all_hold(tests: Sequence[tuple[float, float]]) -> tuple[int, int]:
     """Number of pairs that rise, and number of pairs that have both values."""
-    known = [(a, b) for a, b in tests if isfinite(a) and isfinite(b)]
-    return sum(a < b for a, b in known), len(known)
+    finite = [(a, b) for a, b in tests if isfinite(a) and isfinite(b)]
+    return sum(a < b for a, b in finite), len(finite)
 
 
 def counted(tests: Sequence[tuple[float, float]], what: str) -> Finding:
     """ "27 of 28 pairs ...": holds if all do."""
-    held, known = all_hold(tests)
-    return Finding(f"{what}: {held} of {known}", held == known if known else None)
+    count, total = all_hold(tests)
+    return Finding(f"{what}: {count} of {total}", count == total if total else None)
 
 
 def numbers(values: Sequence[float], form: str = ".3g") -> str:
@@ -92,8 +92,8 @@ def angle(x: Array, h: Array, low: float, high: float) -> float:
     if not len(above[0]) or not len(above[1]):
         return nan
     at = [
-        _crossing(x, h, int(found[0]), level)
-        for found, level in zip(above, (low, high), strict=True)
+        _crossing(x, h, int(indices[0]), level)
+        for indices, level in zip(above, (low, high), strict=True)
     ]
     return float(np.degrees(np.arctan2(1e-3 * (high - low), abs(at[1] - at[0]))))
 

@@ -13,9 +13,9 @@ from softehl.cases.paper.figure_spec import (
     Scope,
     both,
     density_words,
-    doubts,
     profile_table,
     state_table,
+    verdict_note,
 )
 from softehl.cases.paper.states import Request, State, Store, ask, setup
 from softehl.cases.seal.gland.records import DENSITIES
@@ -90,20 +90,20 @@ def sheet_item(name: str, title: str, sheet: Callable[[Scope], Sheet]) -> Item:
 
 
 def _product(name: str, sheet: Sheet, store: Store) -> Product:
-    shown = {c: store.state(c.request.setup, c.speed) for c in sheet.curves}
-    series = [(c.label, state) for c, state in shown.items()]
+    states = {c: store.state(c.request.setup, c.speed) for c in sheet.curves}
+    series = [(c.label, state) for c, state in states.items()]
     rows = -(-len(sheet.panels) // sheet.columns)
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots(rows, sheet.columns, squeeze=False).ravel()
         for one, panel, letter in zip(axes, sheet.panels, "abcdefgh", strict=False):
-            _draw_panel(one, panel, shown)
+            _draw_panel(one, panel, states)
             one.set_title(f"({letter}) {panel.title}")
         for one in axes[len(sheet.panels) :]:
             one.set_axis_off()
 
     tables = {name: profile_table(series), f"{name}_states": state_table(series)}
-    caption = sheet.caption + doubts([state for _, state in series])
+    caption = sheet.caption + verdict_note([state for _, state in series])
     return Product(tables, caption, draw, (3.6 * sheet.columns, 2.9 * rows))
 
 
@@ -142,8 +142,8 @@ def fig_5(scope: Scope) -> Sheet:
         for p_s in scope.some_pressures((0.0, 2.0))
         for speed, stroke in ((u, "outstroke"), (-u, "instroke"))
     ]
-    words = f" |U| = {u:g} mm/s. Which two pressures the paper shows is not in its text."
-    return Sheet(pressure_and_film(curves), density_words(density, 16) + words)
+    note = f" |U| = {u:g} mm/s. Which two pressures the paper shows is not in its text."
+    return Sheet(pressure_and_film(curves), density_words(density, 16) + note)
 
 
 INLET, OUTLET = ("start", -0.3, 0.2), ("end", -0.25, 0.25)
@@ -154,11 +154,11 @@ def fig_6(scope: Scope) -> Sheet:
     """The inlet and outlet zones of Fig. 5 at p_s = 2 MPa."""
     density, u, p_s = scope.mesh(16), scope.speed(100.0), scope.pressure(2.0)
     curves = [curve("outstroke", density, p_s, u), curve("instroke", density, p_s, -u)]
-    ends = ((INLET, "sealed side"), (OUTLET, "air side"))
+    details = ((INLET, "sealed side"), (OUTLET, "air side"))
     panels = [
         replace(panel, title=f"{panel.title}, {side}", around=zoom)
         for panel in pressure_and_film(curves)
-        for zoom, side in ends
+        for zoom, side in details
     ]
     return Sheet(panels, f"{density_words(density, 16)} p_s = {p_s:g} MPa, |U| = {u:g} mm/s.")
 
@@ -184,12 +184,12 @@ def fig_7(scope: Scope) -> Sheet:
 
 def fig_8(scope: Scope) -> Sheet:
     """Details of Fig. 7 (a)."""
-    whole = fig_7(scope)
+    full_sheet = fig_7(scope)
     panels = [
-        Panel("sealed side", drawing.pressure, whole.curves, INLET),
-        Panel("air side", drawing.pressure, whole.curves, OUTLET),
+        Panel("sealed side", drawing.pressure, full_sheet.curves, INLET),
+        Panel("air side", drawing.pressure, full_sheet.curves, OUTLET),
     ]
-    return Sheet(panels, whole.caption)
+    return Sheet(panels, full_sheet.caption)
 
 
 def fig_10(scope: Scope) -> Sheet:
@@ -197,8 +197,8 @@ def fig_10(scope: Scope) -> Sheet:
     densities = scope.meshes(DENSITIES, default=8)
     u, p_s = scope.speed(400.0), scope.pressure(1.0)
     curves = [curve(f"density {d}", d, p_s, u) for d in densities]
-    words = f" FE, m_p = 4, outstroke, p_s = {p_s:g} MPa, U = {u:g} mm/s."
-    return Sheet(pressure_and_film(curves), density_words(densities, DENSITIES) + words)
+    note = f" FE, m_p = 4, outstroke, p_s = {p_s:g} MPa, U = {u:g} mm/s."
+    return Sheet(pressure_and_film(curves), density_words(densities, DENSITIES) + note)
 
 
 def fig_11(scope: Scope) -> Sheet:
@@ -207,8 +207,8 @@ def fig_11(scope: Scope) -> Sheet:
     u, p_s = scope.speed(400.0), scope.pressure(1.0)
     curves = [curve(f"density {d}", d, p_s, u) for d in densities]
     panel = Panel("the dip", drawing.film, curves, ("end", -0.2, -0.07), (0.8, 1.8))
-    words = f" The detail of Fig. 10 at the outlet, outstroke, U = {u:g} mm/s."
-    return Sheet([panel], density_words(densities, (4, 8, 16)) + words, columns=1)
+    note = f" The detail of Fig. 10 at the outlet, outstroke, U = {u:g} mm/s."
+    return Sheet([panel], density_words(densities, (4, 8, 16)) + note, columns=1)
 
 
 def fig_12(scope: Scope) -> Sheet:
@@ -222,8 +222,8 @@ def fig_12(scope: Scope) -> Sheet:
             for m in (1, 2, 3, 4, 5)
         ]
         panels.append(Panel(title, drawing.pressure, curves))
-    words = f" Outstroke, p_s = {p_s:g} MPa, U = {u:g} mm/s."
-    return Sheet(panels, density_words(density, 2) + words)
+    note = f" Outstroke, p_s = {p_s:g} MPa, U = {u:g} mm/s."
+    return Sheet(panels, density_words(density, 2) + note)
 
 
 def _fig_13_or_14(scope: Scope, kind: str) -> Sheet:
@@ -232,11 +232,11 @@ def _fig_13_or_14(scope: Scope, kind: str) -> Sheet:
         Panel(title, drawing.film, _falling(scope, density, p_s, sign, reynolds=kind), log=True)
         for sign, title in ((1.0, "outstroke"), (-1.0, "instroke"))
     ]
-    words = (
+    note = (
         f" {kind.upper()}, m_p = 4; labels: U in mm/s. p_s = {p_s:g} MPa, as in Fig. 15 (the text"
         " gives none for this figure)."
     )
-    return Sheet(panels, density_words(density, 8) + words)
+    return Sheet(panels, density_words(density, 8) + note)
 
 
 def fig_13(scope: Scope) -> Sheet:
@@ -257,8 +257,8 @@ def fig_15(scope: Scope) -> Sheet:
         Panel(f"density {d}", drawing.film, _falling(scope, d, p_s, 1.0), log=True)
         for d in densities
     ]
-    words = f" FE, m_p = 4, outstroke, p_s = {p_s:g} MPa; labels: U in mm/s."
-    return Sheet(panels, density_words(densities, paper) + words, columns=len(densities))
+    note = f" FE, m_p = 4, outstroke, p_s = {p_s:g} MPa; labels: U in mm/s."
+    return Sheet(panels, density_words(densities, paper) + note, columns=len(densities))
 
 
 def fig_19(scope: Scope) -> Sheet:
@@ -276,8 +276,8 @@ def fig_19(scope: Scope) -> Sheet:
         )
         for sign, title in ((1.0, "outstroke"), (-1.0, "instroke"))
     ]
-    words = f" p_s = {p_s:g} MPa, |U| = {u:g} mm/s."
-    return Sheet(panels, density_words(density, 16) + words)
+    note = f" p_s = {p_s:g} MPa, |U| = {u:g} mm/s."
+    return Sheet(panels, density_words(density, 16) + note)
 
 
 ITEMS = (

@@ -63,10 +63,10 @@ def is_complete(request: Request, store: Store) -> bool:
     earlier = _earlier(request, store)
     if earlier is None or earlier[0] not in ENDED or not _has_its_files(request, store):
         return False
-    wanted = request.parameters
-    return set(strokes_of(wanted)) <= set(strokes_of(earlier[1])) and set(wanted.speeds) <= set(
-        earlier[1].speeds
-    )
+    parameters = request.parameters
+    return set(strokes_of(parameters)) <= set(strokes_of(earlier[1])) and set(
+        parameters.speeds
+    ) <= set(earlier[1].speeds)
 
 
 def _has_its_files(request: Request, store: Store) -> bool:
@@ -154,7 +154,7 @@ ITEMS: dict[str, Item] = {
 }
 
 
-def chosen(names: Sequence[str]) -> list[Item]:
+def select_items(names: Sequence[str]) -> list[Item]:
     """The items of these names, all of them if there are none.  Raises BadInput."""
     for name in names:
         if name not in ITEMS:
@@ -167,7 +167,7 @@ def reproduce_items(
     names: Sequence[str], scope: Scope, folder: Path, *, resume: bool, jobs: int
 ) -> int:
     """Compute and write the items; return the exit code.  Raises BadInput."""
-    items = chosen(names)
+    items = select_items(names)
     store = Store(folder / "runs")
     requests = merged(request for item in items for request in item.requests(scope))
     compute(requests, store, resume=resume, jobs=jobs)

@@ -26,12 +26,15 @@ def _finest(scope: Scope) -> int:
 
 def _requests(scope: Scope) -> list[Request]:
     speeds, density = both(scope.some_speeds()), scope.mesh(DENSITY)
-    found = []
+    requests = []
     for p_s in scope.some_pressures(PRESSURES):
-        found += [ask(setup(density, p_s), speeds), ask(setup(density, p_s, **STABILISED), speeds)]
+        requests += [
+            ask(setup(density, p_s), speeds),
+            ask(setup(density, p_s, **STABILISED), speeds),
+        ]
         reference = setup(_finest(scope), p_s, **STABILISED)
-        found.append(ask(reference, speeds))
-    return found
+        requests.append(ask(reference, speeds))
+    return requests
 
 
 def stabilisation(store: Store, scope: Scope) -> Product:

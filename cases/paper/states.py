@@ -48,8 +48,8 @@ _IN_NAME = ("density", "sealed_pressure")
 
 def setup(density: int, sealed_pressure: float, **others: Any) -> Seal:
     """Parameters of a run, without speeds and stroke (those are left at their defaults)."""
-    given: dict[str, Any] = {"density": density, "sealed_pressure": float(sealed_pressure)}
-    return Seal(**{**PAPER, **given, **others})
+    values: dict[str, Any] = {"density": density, "sealed_pressure": float(sealed_pressure)}
+    return Seal(**{**PAPER, **values, **others})
 
 
 @dataclass(frozen=True)
@@ -96,13 +96,13 @@ def merged(requests: Iterable[Request]) -> list[Request]:
 class State:
     """A requested state: its row and files if there are any, and its verdict in any case.
 
-    place: the folder of its files.
+    folder: the folder of its files.
     """
 
     setup: Seal
     rod_speed: float
     row: FilmRow | None = None
-    place: Path | None = None
+    folder: Path | None = None
 
     @property
     def verdict(self) -> str:
@@ -127,9 +127,9 @@ class State:
     @property
     def profile(self) -> Profile:
         """The fields along the film.  Raises ValueError for a state that was not reached."""
-        if self.row is None or self.place is None:
+        if self.row is None or self.folder is None:
             raise ValueError(f"no profile at U = {self.rod_speed:g} mm/s: {self.verdict}")
-        return read_profile(self.place, self.row)
+        return read_profile(self.folder, self.row)
 
     @property
     def title(self) -> str:
@@ -157,10 +157,10 @@ class Store:
     def state(self, parameters: Seal, rod_speed: float) -> State:
         """The state at a signed speed U, mm/s."""
         run = self.run_folder(parameters)
-        for place in (run, run / "rejected"):
-            for row in self._read(place):
+        for folder in (run, run / "rejected"):
+            for row in self._read(folder):
                 if row.rod_speed_mm_s == rod_speed:
-                    return State(parameters, rod_speed, row, place)
+                    return State(parameters, rod_speed, row, folder)
         return State(parameters, rod_speed)
 
     def states(self, parameters: Seal, speeds: Sequence[float]) -> list[State]:
@@ -179,10 +179,14 @@ class Store:
     def effort(self, parameters: Seal, stages: Sequence[str], stroke: str) -> tuple[int, float]:
         """Iterations and seconds of some stages of a run; nan seconds where there is none."""
         path = self.run_folder(parameters) / "run.json"
-        found = read_json(path).get("stages", []) if path.exists() else []
-        mine = [stage for stage in found if stage["name"] in stages and stage["stroke"] == stroke]
-        seconds = sum(stage["seconds"] for stage in mine) if mine else nan
-        return sum(stage["iterations"] for stage in mine), seconds
+        stages_read = read_json(path).get("stages", []) if path.exists() else []
+        selected = [
+            record
+            for record in stages_read
+            if record["name"] in stages and record["stroke"] == stroke
+        ]
+        seconds = sum(record["seconds"] for record in selected) if selected else nan
+        return sum(record["iterations"] for record in selected), seconds
 
     def _read(self, place: Path) -> list[FilmRow]:
         if place not in self._rows:

@@ -103,8 +103,8 @@ def fig_3(_: Store, scope: Scope) -> Product:
             axes.set_axis_off()
             axes.set_title(f"({letter}) mesh density {p.density}")
 
-    words = " Rod (upper line) on the top, sealed side on the left; the ring is not yet squeezed."
-    caption = density_words(densities, (1, 2)) + words
+    note = " Rod (upper line) on the top, sealed side on the left; the ring is not yet squeezed."
+    caption = density_words(densities, (1, 2)) + note
     return Product({"fig3": Table(header, rows)}, caption, draw, (5.6, 2.9))
 
 
@@ -133,9 +133,9 @@ def fig_4(store: Store, scope: Scope) -> Product:
     setups = _fig_4_setups(scope)
     rows = []
     for p in setups:
-        found = store.contact(p)
-        if found is not None:
-            x, pressure = found
+        contact = store.contact(p)
+        if contact is not None:
+            x, pressure = contact
             touching = (
                 x[pressure > p.sealed_pressure + 1e-9] if p.sealed_pressure else x[pressure > 0]
             )
@@ -164,9 +164,9 @@ def _section(axes: Axes, p: Seal, store: Store) -> None:
     """The mesh and the walls, in z to the right and r downwards."""
     import meshio
 
-    found = store.contact(p)
+    contact = store.contact(p)
     axes.set_axis_off()
-    if found is None:
+    if contact is None:
         axes.text(0.5, 0.5, "not reached")
         return
     name = number_text(p.sealed_pressure)
@@ -176,7 +176,7 @@ def _section(axes: Axes, p: Seal, store: Store) -> None:
     rod, housing, half = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter, 0.5 * p.groove_width
     axes.plot([-1.2 * half, 1.2 * half], [rod, rod], color="black")
     axes.plot([-half, -half, half, half], [rod + 0.4, housing, housing, rod + 0.4], color="black")
-    for end in (found[0][0], found[0][-1]):
+    for end in (contact[0][0], contact[0][-1]):
         axes.plot([end, end], [rod - 0.12, rod + 0.12], color="black")
     axes.set_aspect("equal")
     axes.set_xlim(-1.25 * half, 1.25 * half)

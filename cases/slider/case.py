@@ -30,18 +30,27 @@ class SliderRow(Row):
     """A row of curve.csv: one speed."""
 
     files = ("profile_{}.csv",)
-    rod_speed_mm_s: float = column("mm/s", "speed U of the plane", head="U", shown="+g")
-    flux_mm2_s: float = column("mm2/s", "flux q where p is largest", head="flux", shown=".5g")
-    load_N_per_mm: float = column("N/mm", "integral of p > 0", head="load", shown=".5g")
-    p_max_MPa: float = column("MPa", "largest pressure", head="p max", shown=".5g")
-    friction_N_per_mm: float = column("N/mm", "force on the plane", head="friction", shown=".5g")
+    rod_speed_mm_s: float = column("mm/s", "speed U of the plane", head="U", number_format="+g")
+    flux_mm2_s: float = column(
+        "mm2/s", "flux q where p is largest", head="flux", number_format=".5g"
+    )
+    load_N_per_mm: float = column("N/mm", "integral of p > 0", head="load", number_format=".5g")
+    p_max_MPa: float = column("MPa", "largest pressure", head="p max", number_format=".5g")
+    friction_N_per_mm: float = column(
+        "N/mm", "force on the plane", head="friction", number_format=".5g"
+    )
     rupture_mm: float = column(
-        "mm", "where the film ruptures; empty where it does not", head="rupture", shown=".4g"
+        "mm",
+        "where the film ruptures; empty where it does not",
+        head="rupture",
+        number_format=".4g",
     )
     reformation_mm: float = column(
         "mm", "where it forms again (mass-conserving); empty where it does not", default=np.nan
     )
-    error_percent: float = column("%", "of flux, load", head="error", shown=".2g", default=np.nan)
+    error_percent: float = column(
+        "%", "of flux, load", head="error", number_format=".2g", default=np.nan
+    )
     verdict: str = column("", "`ok`; `coarse` where the estimated error is above 2 %", default="")
 
     def cells(self) -> tuple[Cell, ...]:
@@ -58,8 +67,8 @@ def results(problem: Problem, solution: Solution) -> tuple[SliderRow, dict[str, 
     if "film_facet" in problem.parameters:  # (22) conserves the mean flux at the facets
         flux = problem.fields("film_facet", solution.x)["flux"][:, 0]
     x, h, p, dx, tau = (at[name].ravel() for name in ("x", "h", "p", "dx", "tau_rod"))
-    way = -1 if problem.parameters["film"][1] < 0.0 else 1
-    along, carried = way * x[::way], p[::way]
+    direction = -1 if problem.parameters["film"][1] < 0.0 else 1
+    along, carried = direction * x[::direction], p[::direction]
     first = int(carried.argmax()) if p.max() > 0.0 else 0
     rupture, _ = interval_below(along[first:], carried[first:], 0.0)
     row = SliderRow(
@@ -68,7 +77,7 @@ def results(problem: Problem, solution: Solution) -> tuple[SliderRow, dict[str, 
         load_N_per_mm=float(np.maximum(p, 0.0) @ dx),
         p_max_MPa=float(p.max()),
         friction_N_per_mm=float(tau @ dx),
-        rupture_mm=way * rupture,
+        rupture_mm=direction * rupture,
     )
     return row, {"x_mm": x, "h_um": 1e3 * h, "p_MPa": p}
 
@@ -76,7 +85,7 @@ def results(problem: Problem, solution: Solution) -> tuple[SliderRow, dict[str, 
 def without_noise(p: Slider, problem: Problem, solution: Solution) -> Solution:
     """The solution; its pressures are zero if the largest is rounding: 2e-15 of `unit` at most."""
     part, speed = problem.layout.part(PRESSURE), abs(problem.parameters["film"][1])
-    unit = 12.0 * p.viscosity * speed * (p.end - p.start) / p.ends[1].min() ** 2
+    unit = 12.0 * p.viscosity * speed * (p.end - p.start) / p.segment_ends[1].min() ** 2
     pressures, noise = solution.x[part], 1e-12 * unit
     if pressures.max() > noise:
         return solution
@@ -90,17 +99,19 @@ def conserving_results(
 ) -> tuple[SliderRow, dict[str, Array]]:
     """`results` with void fractions: fronts within subcells, and the load up to where they are."""
     strip, layout = strip_of(p, 0.0), problem.layout
-    way = -1 if problem.parameters["film"][1] < 0.0 else 1
+    direction = -1 if problem.parameters["film"][1] < 0.0 else 1
     pressures, voids = (solution.x[layout.part(name)] for name in ("pressure", "void"))
-    x, p_c = strip.places, p.cavitation_pressure
-    rupture, formed = fronts(way * x[::way], pressures[::way], voids[::way], p_c)
+    x, p_c = strip.positions, p.cavitation_pressure
+    rupture, formed = fronts(
+        direction * x[::direction], pressures[::direction], voids[::direction], p_c
+    )
     row, profile = results(problem, solution)
     at = problem.fields("film", solution.x)
     load = float(((at["p"] + at["p_a"]) * at["dx"]).sum())
-    load -= beyond_front(way * x[::way], pressures[::way] - p_c, formed)
+    load -= beyond_front(direction * x[::direction], pressures[::direction] - p_c, formed)
     profile["h_T_um"] = 1e3 * at["h_T"].ravel()
-    profile["void_fraction"] = at["v_out" if way > 0 else "v_in"].ravel()
-    row = replace(row, rupture_mm=way * rupture, reformation_mm=way * formed)
+    profile["void_fraction"] = at["v_out" if direction > 0 else "v_in"].ravel()
+    row = replace(row, rupture_mm=direction * rupture, reformation_mm=direction * formed)
     return replace(row, load_N_per_mm=load), profile
 
 
@@ -120,7 +131,7 @@ class SliderCase(RowByRow[Slider, SliderRow]):
     def state(self, parameters: Slider, key: float, problem: Problem, solution: Solution) -> State:
         """h is linear between the nodes: an error of second order, seen from half the segments."""
 
-        def found(
+        def results_of(
             p: Slider, problem: Problem, solution: Solution
         ) -> tuple[SliderRow, dict[str, Array]]:
             solution = without_noise(p, problem, solution)
@@ -130,8 +141,8 @@ class SliderCase(RowByRow[Slider, SliderRow]):
 
         half = parameters.model_copy(update={"segments": parameters.segments // 2})
         coarser = self.solution(half, key)
-        row, profile = found(parameters, problem, solution)
-        other, _ = found(half, *coarser)
+        row, profile = results_of(parameters, problem, solution)
+        other, _ = results_of(half, *coarser)
         fine, coarse = (np.array([r.flux_mm2_s, r.load_N_per_mm]) for r in (row, other))
         error = 100.0 / 3.0 * float((np.abs(coarse - fine) / np.maximum(np.abs(fine), 1e-99)).max())
         verdict = OK if error <= 2.0 else "coarse"

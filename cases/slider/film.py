@@ -62,7 +62,7 @@ class Strip:
         return self.order * len(self.x) + 1
 
     @property
-    def places(self) -> Array:
+    def positions(self) -> Array:
         """Places of pressures and void fractions, (unknowns,), mm."""
         share = 0.5 * (1.0 + quadrature.pressure_nodes(self.order)[:-1])
         inner = self.x[:, :1] + share * np.diff(self.x, axis=1)
@@ -87,8 +87,8 @@ class Strip:
         points = np.stack([self.x, self.h], axis=2).reshape(2 * n, 2)
         study = Study(Mesh(points, {"line2": np.arange(2 * n).reshape(n, 2)}))
         rule, each = quadrature.rupture_rule(self.order, polynomial=False), np.arange(self.unknowns)
-        known = {name: value for name, value in values.items() if name in flow.parameters}
-        study.add(FILM, flow, along=along, rule=rule, **known)
+        arguments = {name: value for name, value in values.items() if name in flow.parameters}
+        study.add(FILM, flow, along=along, rule=rule, **arguments)
         study.add(
             *("cavitation", load_kernel("film_void")),
             on=np.empty((len(each), 0), np.int64),
@@ -98,7 +98,7 @@ class Strip:
         )
         return study
 
-    def posed(self, study: Study, speed: float) -> Problem:
+    def build_problem(self, study: Study, speed: float) -> Problem:
         """The problem of a study of it, with the sizes of its fluxes (mm^2/s) at a speed.
 
         Everything is free but the place of the surfaces; `between` prescribes the ends.
@@ -112,11 +112,11 @@ class Strip:
         sizes: dict[str, float | Array] = {DISPLACEMENT: 1.0, VOID: 1.0, PRESSURE: fluxes}
         return replace(problem, scales=sizes, absolute=True)
 
-    def between(self, problem: Problem, ends: Array, inflow: Array) -> Problem:
+    def between(self, problem: Problem, end_pressures: Array, inflow: Array) -> Problem:
         """The problem with pressures (MPa) and void fractions (2,) prescribed at both ends."""
         layout = problem.layout
         outer = (layout.dofs(name)[[0, -1]] for name in (PRESSURE, VOID))
-        return problem.with_fixed([layout.dofs(DISPLACEMENT), *outer], [0.0, ends, inflow])
+        return problem.with_fixed([layout.dofs(DISPLACEMENT), *outer], [0.0, end_pressures, inflow])
 
     def starved(self, speed: float, supply: float | None) -> Array:
         """Void fractions (2,) of the ends where the plane brings in a film of this thickness, mm.
@@ -141,10 +141,10 @@ def fronts(x: Array, p: Array, v: Array, p_c: float) -> tuple[float, float]:
     v = np.append(v[:-1], v[-2])  # nothing flows out of the last node
     torn = v / VOID_SCALE > np.maximum((p - p_c) / PRESSURE_SCALE, 1e-9 / VOID_SCALE)
     starts = np.flatnonzero(~torn[:-1] & torn[1:]) + 1
-    ends = np.flatnonzero(torn[:-1] & ~torn[1:]) + 1
+    stops = np.flatnonzero(torn[:-1] & ~torn[1:]) + 1
     return (
         _rupture(x, v, int(starts[0])) if len(starts) else np.nan,
-        _reformation(x, p - p_c, int(ends[0])) if len(ends) else np.nan,
+        _reformation(x, p - p_c, int(stops[0])) if len(stops) else np.nan,
     )
 
 
@@ -152,9 +152,9 @@ def _rupture(x: Array, v: Array, i: int) -> float:
     """Void fractions belong to the middle of the subcell behind their node."""
     if i + 2 >= len(x) or not v[i + 1] > v[i]:
         return float(x[i])
-    middle, behind = 0.5 * (x[i] + x[i + 1]), 0.5 * (x[i + 1] + x[i + 2])
-    found = middle - v[i] * (behind - middle) / (v[i + 1] - v[i])
-    return float(found) if found > x[max(i - 2, 0)] else float(x[i])
+    middle, next_middle = 0.5 * (x[i] + x[i + 1]), 0.5 * (x[i + 1] + x[i + 2])
+    position = middle - v[i] * (next_middle - middle) / (v[i + 1] - v[i])
+    return float(position) if position > x[max(i - 2, 0)] else float(x[i])
 
 
 def _reformation(x: Array, p: Array, j: int) -> float:
@@ -176,44 +176,46 @@ def strip_of(p: Slider, alpha: float) -> Strip:
     surfaces = SurfacePair.of(p.roughness, p.asperity_stiffness, p.boundary_friction)
     thinning = p.film_suffix, p.thinning_values(p.viscosity)
     oil = Oil(p.viscosity, alpha, p.cavitation_pressure, *thinning)
-    return Strip(*p.ends, p.pressure_order, oil, surfaces)
+    return Strip(*p.segment_ends, p.pressure_order, oil, surfaces)
 
 
 def conserving_problem(p: Slider, speed: float, alpha: float) -> Problem:
     """The film with void fractions between its end pressures."""
     strip = strip_of(p, alpha)
-    problem = strip.posed(strip.study(speed), speed)
-    return strip.between(problem, _ends(p, alpha), strip.starved(speed, p.supply))
+    problem = strip.build_problem(strip.study(speed), speed)
+    return strip.between(problem, _end_pressures(p, alpha), strip.starved(speed, p.supply))
 
 
-def _ends(p: Slider, alpha: float) -> Array:
+def _end_pressures(p: Slider, alpha: float) -> Array:
     """Pressures (2,) at both ends; reduced ones for a film without Barus' law (alpha = 0)."""
-    ends = np.array([p.start_pressure, p.end_pressure])
+    pressures = np.array([p.start_pressure, p.end_pressure])
     if p.pressure_viscosity and not alpha:
-        return np.asarray(-np.expm1(-p.pressure_viscosity * ends) / p.pressure_viscosity)
-    return ends
+        return np.asarray(-np.expm1(-p.pressure_viscosity * pressures) / p.pressure_viscosity)
+    return pressures
 
 
 def film_problem(p: Slider, speed: float, alpha: float) -> Problem:
     """The film between its end pressures (alpha = 0: the reduced ones), on a rod of radius zero."""
     x, order, dg = p.nodes, p.pressure_order, p.reynolds == "dg"
     chain = np.arange(p.segments)[:, None] + np.arange(3)
-    places = (dofmap.separate_dofs if dg else dofmap.chain_dofs)(p.segments, order, 0)
+    positions = (dofmap.separate_dofs if dg else dofmap.chain_dofs)(p.segments, order, 0)
     film, thinning = load_kernel(f"film{p.film_suffix}"), p.thinning_values(p.viscosity)
     oil: dict[str, Any] = {"rod_radius": 0.0, "rod_speed": speed, "viscosity": p.viscosity}
     oil["pressure_viscosity"] = alpha
     weights = {"cavitation_penalty": p.cavitation_penalty, "force_weight": 1.0, "shear_weight": 1.0}
     values = {**oil, **weights, **thinning}
-    given = {name: values[name] for name in film.parameters}
+    arguments = {name: values[name] for name in film.parameters}
     study = Study(Mesh(np.stack([x, p.gap(x)], axis=1), {"line2": chain[:, :2]}))
-    study.add(FILM, film, along={PRESSURE: places}, rule=quadrature.film_rule(order), **given)
+    study.add(
+        FILM, film, along={PRESSURE: positions}, rule=quadrature.film_rule(order), **arguments
+    )
     if dg:
-        sides, rule = np.hstack([places[:-1], places[1:]]), quadrature.facet_rule(order)
+        sides, rule = np.hstack([positions[:-1], positions[1:]]), quadrature.facet_rule(order)
         facet, inner = load_kernel("film_facet"), chain[:-1]
         study.add("film_facet", facet, on=inner, along={PRESSURE: sides}, rule=rule, **oil)
     study.fix(np.arange(len(x)), u_z=0.0, u_r=0.0)
     problem = study.system({DISPLACEMENT: MOVED}).resting()
-    return problem.also_fixed(problem.layout.dofs(PRESSURE)[[0, -1]], _ends(p, alpha))
+    return problem.also_fixed(problem.layout.dofs(PRESSURE)[[0, -1]], _end_pressures(p, alpha))
 
 
 def conserving_solution(p: Slider, speed: float) -> tuple[Problem, Solution]:
@@ -232,8 +234,8 @@ def transformed(
     """The film by Barus' law, from the one without, whose pressures are reduced ones."""
     x, part = reduced.x.copy(), problem.layout.part(PRESSURE)
     if alpha * x[part].max() >= 1.0:
-        words = "no pressure carries this film; use a smaller pressure_viscosity or speed"
-        return problem, replace(reduced, status=Status.DIVERGED, message=words)
+        message = "no pressure carries this film; use a smaller pressure_viscosity or speed"
+        return problem, replace(reduced, status=Status.DIVERGED, message=message)
     x[part] = -np.log1p(-alpha * x[part]) / alpha
     return problem, newton.solve(problem, x)
 

@@ -135,7 +135,7 @@ class Slider(ThinningKeys):
         return np.append(np.concatenate(parts), self.end)
 
     @property
-    def ends(self) -> tuple[Array, Array]:
+    def segment_ends(self) -> tuple[Array, Array]:
         """Places and gaps (n, 2) at the ends of the segments; a gap may jump between them."""
         nodes = self.nodes
         x = np.stack([nodes[:-1], nodes[1:]], axis=1)

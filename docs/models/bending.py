@@ -17,8 +17,8 @@ class Beam(Parameters):
 
 @dataclass(frozen=True, kw_only=True)
 class TipRow(Row):
-    force_N: float = column("N", "force at the tip", head="F", shown="g")
-    tip_mm: float = column("mm", "displacement of the tip", head="tip", shown=".4g")
+    force_N: float = column("N", "force at the tip", head="F", number_format="g")
+    tip_mm: float = column("mm", "displacement of the tip", head="tip", number_format=".4g")
     verdict: str = column("", "`ok`", default=OK)
 
 

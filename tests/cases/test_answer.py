@@ -20,7 +20,7 @@ from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.parts import tolerances
 from softehl.cases.seal.states.state import UNCERTAIN, FilmRow
-from softehl.cases.seal.states.summary import RETURNS, answer
+from softehl.cases.seal.states.summary import RETURNS, run_summary
 from tests.cases.test_leakage import row
 
 
@@ -54,7 +54,7 @@ from tests.cases.test_leakage import row
 def test_whether_a_seal_leaks_and_what_friction_it_has(
     rows: Sequence[FilmRow], head: str, said: str
 ) -> None:
-    first, line = answer(rows, 100.0)
+    first, line = run_summary(rows, 100.0)
     assert first == head + (" in a cycle of 100 mm out and back" if len(rows) > 1 else "")
     assert line.startswith("  400 mm/s: ")
     assert said in line
@@ -64,14 +64,14 @@ def test_whether_a_seal_leaks_and_what_friction_it_has(
 def test_films_thinner_than_roughness_are_an_alarm() -> None:
     back = replace(row(-400.0, 1.1), lambda_ratio=0.7, regime="boundary")
     out = replace(row(400.0, 1.4), lambda_ratio=3.5, regime="full")
-    line = answer([out, back], 100.0)[1]
+    line = run_summary([out, back], 100.0)[1]
     assert isinstance(line, Alarm)
     assert line.endswith(
         "least lambda 0.7 (boundary, instroke); film below the roughness of the surfaces: instroke"
     )
     smooth = replace(row(400.0, 1.4), h_min_um=0.1)
-    assert isinstance(answer([smooth], 100.0)[1], Alarm)
-    assert "usual roughness, 0.2 um: outstroke" in answer([smooth], 100.0)[1]
+    assert isinstance(run_summary([smooth], 100.0)[1], Alarm)
+    assert "usual roughness, 0.2 um: outstroke" in run_summary([smooth], 100.0)[1]
     page = render([cycles()], [Part("x", lines=[line, "calm"])])
     assert f'<li class="not">{line}</li><li>calm</li>' in page
 
@@ -102,7 +102,7 @@ def test_a_report_of_cycles_has_their_numbers() -> None:
         "cycle 3: leaks 0.51 mm3, 1.28 cm3 in 100 m of travel; friction 12 N out, 10 N in at most; "
         "its work 425 mJ"
     )
-    assert run.case.answer(run.parameters, run.rows) == [said]
+    assert run.case.summary(run.parameters, run.rows) == [said]
     assert parts_of([run])[0].title == "Answer"
     page = render([run], parts_of([run]))
     assert said in page
@@ -113,21 +113,21 @@ def test_a_report_of_cycles_has_their_numbers() -> None:
 def test_a_rod_that_does_not_come_back_returns_nothing() -> None:
     run = cycles()
     back = replace(run.rows[0], leak_mm3=-0.51)
-    assert "returns what it takes out" in run.case.answer(run.parameters, [back])[0]
+    assert "returns what it takes out" in run.case.summary(run.parameters, [back])[0]
     motion = ((0.0, 100.0), (0.2, 100.0), (0.25, -100.0))
-    (line,) = run.case.answer(cycle.Cycle(motion=motion), [back])
+    (line,) = run.case.summary(cycle.Cycle(motion=motion), [back])
     assert line.startswith("cycle 3: -0.51 mm3 past the air end, by a rod that does not come back")
 
 
 def test_rough_cycles_say_how_they_break_away() -> None:
     run = cycles()
     known = replace(run.rows[0], breakaway_N=15.0, lambda_ratio=3.5)
-    (calm,) = run.case.answer(run.parameters, [known])
+    (calm,) = run.case.summary(run.parameters, [known])
     assert "10 N in at most; 15 N to break away; its work 425 mJ; least lambda 3.5" in calm
     assert not isinstance(calm, Alarm)
-    (one_way,) = run.case.answer(run.parameters, [replace(known, friction_in_N=9.0)])
+    (one_way,) = run.case.summary(run.parameters, [replace(known, friction_in_N=9.0)])
     assert "friction 12 N out at most; 15 N to break away" in one_way
-    (line,) = run.case.answer(run.parameters, [replace(known, lambda_ratio=0.7)])
+    (line,) = run.case.summary(run.parameters, [replace(known, lambda_ratio=0.7)])
     assert isinstance(line, Alarm)
     assert line.endswith("least lambda 0.7; film below the roughness of the surfaces")
 

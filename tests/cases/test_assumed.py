@@ -12,7 +12,7 @@ RING = ("ring=AS568-210", "rod=19")
 
 def assumed(*assignments: str, case: str = "oring") -> list[str]:
     run = read_case(case, SHIPPED, assignments)
-    return run.case.assumed(run.parameters, run.given)
+    return run.case.assumed(run.parameters, run.set_keys)
 
 
 def test_of_nothing_given_everything_is_said() -> None:

@@ -35,7 +35,7 @@ from softehl.cases.seal.states.state import (
     Profile,
     Section,
     StageRecord,
-    place,
+    operating_point,
 )
 from softehl.runtime.kernels.kernel import MissingKernelsError
 from softehl.runtime.kernels.shared_library import library_of
@@ -138,7 +138,9 @@ def solve(parameters: Seal, observer: Observer) -> Outcome:
 
 
 def outcome(*states: FilmState, status: Status = Status.CONVERGED, message: str = "") -> Outcome:
-    stage = StageRecord("contact", 0.5, 4, 3, ((1.0, 1e-2, 1e-5),), (1.0,), place(1.0, "out"))
+    stage = StageRecord(
+        "contact", 0.5, 4, 3, ((1.0, 1e-2, 1e-5),), (1.0,), operating_point(1.0, "out")
+    )
     unknowns = {"total": 1234, "pressure": 109}
     return Outcome(states, status, message, unknowns, USED, (stage,))
 

@@ -47,7 +47,7 @@ def problem_of(one: Strip, speed: float) -> Problem:
     along, rule = {PRESSURE: one.rows, VOID: one.rows}, quadrature.content_rule(one.order)
     resting = dict[str, Any](dict.fromkeys(content.parameters, 0.0))
     study.add(SQUEEZE, content, along=along, rule=rule, **resting)
-    return one.posed(study, speed).with_parameters(**{SQUEEZE: None})
+    return one.build_problem(study, speed).with_parameters(**{SQUEEZE: None})
 
 
 def march(gap: Gap, times: Array, order: int, ends: float) -> list[tuple[Array, Array, float]]:
@@ -97,7 +97,7 @@ def test_the_squeezed_strip_converges_with_the_order_of_its_differences(order: i
     errors: list[float] = []
     for n in counts:
         p, _, _ = march(gap, np.linspace(0.0, end, n + 1), order, 0.0)[-1]
-        places = strip(h0).places
+        places = strip(h0).positions
         load = float(0.5 * (p[1:] + p[:-1]) @ np.diff(places))
         # linear pressures on subcells carry a little less of the parabola, whatever the steps
         share = np.trapezoid(places * (L - places), places) * 6.0 / L**3
@@ -124,7 +124,7 @@ def test_plates_that_swing_rupture_and_keep_their_oil() -> None:
     # the front stands within segments of 1/8: least half-width of the full film at either end
     k = int(np.argmin(abs(times - 0.3148258613)))
     _, v, _ = found[k]
-    x = strip(1.0).places
+    x = strip(1.0).positions
     first = int(np.flatnonzero(v > 1e-9)[0])
     assert 0.0 < x[first] < 0.125
     assert 0.005 < x[first] < 0.06  # 0.0230077051, on subcells of 0.02 to 0.04
@@ -151,10 +151,10 @@ def test_the_frame_does_not_matter() -> None:
 def test_motions_repeat_and_stop_at_their_corners() -> None:
     sine = Motion.sine(20.0, 2.0, 1.0)
     assert sine.speed.largest == pytest.approx(40.0 * math.pi)
-    assert sine.place(0.125) == pytest.approx(10.0, rel=2e-4)
-    assert sine.place(5.125) == pytest.approx(sine.place(0.125), abs=1e-9)
+    assert sine.position(0.125) == pytest.approx(10.0, rel=2e-4)
+    assert sine.position(5.125) == pytest.approx(sine.position(0.125), abs=1e-9)
     trapezoid = Motion.trapezoid(20.0, 2.0, 0.1, 1.0)
-    assert trapezoid.place(0.125) == pytest.approx(10.0)
+    assert trapezoid.position(0.125) == pytest.approx(10.0)
     assert trapezoid.speed.next_corner(0.0) == pytest.approx(0.1)
     assert trapezoid.speed.next_corner(0.1) == pytest.approx(0.15)
     with pytest.raises(ValueError, match="rising"):
@@ -165,11 +165,11 @@ def test_the_rod_brings_back_what_was_left_on_it() -> None:
     rod = RodFilm([], [])
     for place, film in ((0.0, 1.0), (1.0, 3.0), (2.0, 5.0)):
         rod.leave(place, film)
-    assert rod.found(0.5) == 2.0
-    assert rod.found(2.5) is None
+    assert rod.thickness_at(0.5) == 2.0
+    assert rod.thickness_at(2.5) is None
     rod.leave(1.0, 7.0)
-    assert rod.found(1.5) is None
-    assert rod.found(1.0) == 7.0
+    assert rod.thickness_at(1.5) is None
+    assert rod.thickness_at(1.0) == 7.0
 
 
 def cycle(folder: Path, *settings: str) -> dict[str, Array]:

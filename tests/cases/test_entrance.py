@@ -26,7 +26,7 @@ def test_the_pressure_of_the_entrance_is_at_the_end_where_oil_comes_in() -> None
     gap = np.zeros(2)
     for stroke, ends in (("out", [3.5, 0.0]), ("in", [3.0, 0.5])):
         film = FilmLoads(3.0, cast("Stroke", stroke), 400.0, gap, entrance=0.5)
-        assert film.ends.tolist() == ends
+        assert film.end_pressures.tolist() == ends
 
 
 @pytest.mark.parametrize("parts", [1, 7])

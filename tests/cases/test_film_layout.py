@@ -38,7 +38,7 @@ def film(system: SealSystem, h: Array, p: Array) -> Array:
 
 
 def test_a_film_that_does_not_change_has_the_longest_segments(system: SealSystem) -> None:
-    s = system.section.places
+    s = system.section.positions
     still = np.full(len(s), THICKNESS)
     _, size = sizes(system, film(system, still, np.ones(len(s))), THICKNESS)
     assert size == pytest.approx(np.full(len(size), s[-1] / COARSEST_OF_FILM))
@@ -46,7 +46,7 @@ def test_a_film_that_does_not_change_has_the_longest_segments(system: SealSystem
 
 def test_thickness_and_pressure_ask_for_so_much_of_their_change(system: SealSystem) -> None:
     """ln h of a constant slope; p of a constant slope; the steeper one of them decides."""
-    s = system.section.places
+    s = system.section.positions
     k, rise = 12.0 / s[-1], 4.0 / s[-1]
     thin = THICKNESS * np.exp(k * s - 6.0)  # from 1/400 of it to 400 times
     x = film(system, thin, np.ones(len(s)))
@@ -63,7 +63,7 @@ def test_thickness_and_pressure_ask_for_so_much_of_their_change(system: SealSyst
 
 
 def test_segments_grow_away_from_a_step(system: SealSystem) -> None:
-    s, node = system.section.places, 30
+    s, node = system.section.positions, 30
     h = np.where(np.arange(len(s)) < node, THICKNESS, 3.0 * THICKNESS)
     at, size = sizes(system, film(system, h, np.ones(len(s))), THICKNESS)
     least = THINNING / np.log(3.0) * (s[node] - s[node - 1])
@@ -73,7 +73,7 @@ def test_segments_grow_away_from_a_step(system: SealSystem) -> None:
 
 
 def test_the_misfit_is_the_number_of_segments_in_the_place_of_one(system: SealSystem) -> None:
-    s, node = system.section.places, 30
+    s, node = system.section.positions, 30
     h = np.where(np.arange(len(s)) < node, THICKNESS, 9.0 * THICKNESS)
     x = film(system, h, np.ones(len(s)))
     asked = np.log(9.0) / THINNING
@@ -83,7 +83,7 @@ def test_the_misfit_is_the_number_of_segments_in_the_place_of_one(system: SealSy
 
 
 def test_a_mesh_that_is_made_for_a_film_fits_it(system: SealSystem) -> None:
-    s, node = system.section.places, 30
+    s, node = system.section.positions, 30
     h = np.where(np.arange(len(s)) < node, THICKNESS, 9.0 * THICKNESS)
     layout = film_layout(system, film(system, h, np.ones(len(s))), THICKNESS)
     places = layout.mesh(2).arc_places

@@ -147,7 +147,7 @@ def test_a_mesh_that_is_given_is_not_made_anew(dry: DryContact, films: dict[floa
     film = films[400.0]
     uniform = P.model_copy(update={"mesh": "uniform"})
     system = dry.system.moved(uniform, dry.system.section)
-    squeeze_film, now = film.begun
+    squeeze_film, now = film.start_state
     begun = squeeze_film.carried(system, film.x, dry.x), now
     no = NoFilm("out", 400.0, Status.DIVERGED, "no film", begun)
     assert adaptation(uniform, dry).adapted(no) is no

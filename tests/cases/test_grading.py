@@ -38,21 +38,21 @@ def _curve(**changes: object) -> Outcome:
 
 def test_the_edge_of_a_pressure_like_a_square_root_is_found_exactly() -> None:
     system = build_system(oring(density=2))
-    s = system.section.places
+    s = system.section.positions
     x = system.at_rest()
     first, last = 0.413, 1.777
     system.rod_multipliers(x)[:] = -np.sqrt(np.maximum(np.minimum(s - first, last - s), 0.0))
     edges = contact_edges(system, x)
-    assert [edge.place for edge in edges] == pytest.approx([first, last], abs=1e-12)
+    assert [edge.position for edge in edges] == pytest.approx([first, last], abs=1e-12)
     assert [edge.rise for edge in edges] == pytest.approx([1.0, 1.0], abs=1e-12)
 
 
 def test_segments_are_finest_at_the_edges_of_the_contact() -> None:
     system, x = _contact(2)
-    s = system.section.places
+    s = system.section.positions
     sizes, middle = np.diff(s), 0.5 * (s[1:] + s[:-1])
     for edge in contact_edges(system, x):
-        nearest = np.abs(middle - edge.place).argmin()
+        nearest = np.abs(middle - edge.position).argmin()
         assert sizes[nearest] < 1.6 * sizes.min()
         assert sizes[nearest] < 1.4 * sizes[nearest - 2 : nearest + 3].min()
     assert sizes.min() < 0.2 * sizes.mean()

@@ -56,7 +56,7 @@ def ending_at(lip: float | None, crown: float | None) -> State:
 
 def corrected(system: SealSystem, x: Array) -> Layout:
     rod, housing = (system.pressing(name, x) for name in (ROD, BORE))
-    return system.section.layout.held(system.mesh, rod, housing, P.sealed_pressure)
+    return system.section.layout.with_sealed_ends(system.mesh, rod, housing, P.sealed_pressure)
 
 
 def test_where_in_the_contact_pressure_ends_does_not_matter() -> None:

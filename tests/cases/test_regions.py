@@ -45,7 +45,7 @@ def _state(system: SealSystem, size: float) -> Array:
 def test_two_regions_of_one_material_are_one_region_bitwise() -> None:
     two = build_system(Seal(**CAPPED, **SAME))
     p = two.parameters.model_copy(update={"materials": {}})
-    one = SealSystem.of(p, replace(two.section, own=()))
+    one = SealSystem.of(p, replace(two.section, own_regions=()))
     assert (two.solids, one.solids) == (("solid cap", "solid"), ("solid",))
     x = _state(two, 2e-3)
     loads = ContactLoads(1.0, {}, 0.0)

@@ -122,7 +122,7 @@ def test_pressure_above_the_contact_is_no_collapse_where_inlets_are_shown(
 ) -> None:
     """A film that is as thick as an inlet gives may move load from one lobe to another."""
     film = replace(HEALTHY, p_max=4.8, inlet_ratio=0.9999)
-    verdict = Verdict(reference=3.74, slopes=True)
+    verdict = Verdict(reference=3.74, judge_slopes=True)
     assert verdict.after(film).word == OK
     assert verdict.after(replace(film, **change)).word == COLLAPSED
 
@@ -237,7 +237,7 @@ def test_ok_is_a_promise(
     changes: dict[str, Any], error: float | None, word: str, says: str
 ) -> None:
     """Nothing is ok whose inlet, arc, thickness or estimated error speaks against it."""
-    start = Verdict(reference=4.0, slopes=True, error=error)
+    start = Verdict(reference=4.0, judge_slopes=True, error=error)
     verdict = start.after(replace(HEALTHY, **changes))
     assert verdict.word == word
     assert says in verdict.advice

@@ -18,9 +18,9 @@ class Fall(Row):
     """A made-up row: a stone that falls."""
 
     files = ("path_{}.csv",)
-    height_m: float = column("m", "height", head="H", shown="g")
-    start_s: float = column("s", "when it is let go", head="time", shown=".1f")
-    end_s: float = column("s", "when it is there", head="time", shown="+.1f")
+    height_m: float = column("m", "height", head="H", number_format="g")
+    start_s: float = column("s", "when it is let go", head="time", number_format=".1f")
+    end_s: float = column("s", "when it is there", head="time", number_format="+.1f")
     bounces: int = column("", "how often it is thrown back | or not")
     verdict: str = column("", "`ok`")
 

@@ -170,7 +170,7 @@ def test_the_sealed_pressure_ends_on_the_same_lobe_of_every_mesh(density: int) -
 def test_a_groove_that_grazes_the_rod_parts_two_contacts_once_it_opens() -> None:
     system = build_system(Seal(section="rectangular", **GROOVE))
     x = system.at_rest()
-    pressure = np.zeros(len(system.section.places))
+    pressure = np.zeros(len(system.section.positions))
     pressure[10:60] = 2.0 + np.sin(np.arange(50.0))
     system.rod_multipliers(x)[:] = -pressure
     nodes = system.mesh.arc_nodes
@@ -185,15 +185,15 @@ def test_a_groove_that_grazes_the_rod_parts_two_contacts_once_it_opens() -> None
 
 def test_corner_peaks_do_not_place_an_edge() -> None:
     system = build_system(Seal(section="rectangular", **GROOVE))
-    s, x = system.section.places, system.at_rest()
+    s, x = system.section.positions, system.at_rest()
     touching = slice(20, 40)
     pressure = np.zeros(len(s))
     pressure[touching] = 1.0
     pressure[21], pressure[38] = 5.0, 5.0  # a straight line through these falls outwards
     system.rod_multipliers(x)[:] = -pressure
     first, last = contact_edges(system, x)
-    assert s[19] <= first.place <= s[20]
-    assert s[39] <= last.place <= s[40]
+    assert s[19] <= first.position <= s[20]
+    assert s[39] <= last.position <= s[40]
     assert first.rise > 0.0
     assert last.rise > 0.0
 
@@ -275,7 +275,7 @@ def test_a_drawn_u_cup_that_cavitates_between_heel_and_lip(tmp_path: Path) -> No
 
 
 def test_the_second_inlet_is_to_be_seen_too_where_it_is_filled() -> None:
-    verdict = Verdict(3.8, references=(2.1, 3.8), slopes=True)
+    verdict = Verdict(3.8, references=(2.1, 3.8), judge_slopes=True)
     film = _numbers(0.27, 0.27)
     sealed, air = film.contacts
     rough = verdict.after(replace(film, contacts=(sealed, replace(air, inlet_ratio=0.74))))
@@ -351,14 +351,14 @@ def mirrored(system: SealSystem, x: Array) -> tuple[SealSystem, Array]:
     order = np.concatenate(
         [np.arange(mesh.arc, -1, -1), np.arange(len(mesh.boundary) - 1, mesh.arc, -1)]
     )
-    places = mesh.places[order]
+    places = mesh.positions[order]
     places[mesh.arc + 1 :] -= mesh.length
     image = replace(
         mesh,
         points=mesh.points * flip,
         quads=mesh.quads[:, ::-1],
         boundary=mesh.boundary[order],
-        places=-places,
+        positions=-places,
     )
     new = SealSystem.of(system.parameters, replace(system.section, mesh=image))
     y, size = new.at_rest(), len(mesh.points)

@@ -121,7 +121,7 @@ def test_bulges_are_converted_exactly(tmp_path: Path) -> None:
     for angle in (0.3, 2.0, 4.0):
         side = 2.0 if cos(angle) > 0 else -2.0
         there = np.array([[side + cos(angle), 25.0 + sin(angle)]])
-        assert shape.outline.at(shape.outline.place(there)) == pytest.approx(there, abs=1e-12)
+        assert shape.outline.at(shape.outline.position(there)) == pytest.approx(there, abs=1e-12)
 
 
 def turn(space: Any) -> None:
@@ -208,7 +208,7 @@ def test_a_film_away_from_the_rod_is_refused() -> None:
 
 def save(mesh: SectionMesh, shape: Shape, path: Path, **changes: Any) -> Path:
     """A Gmsh file of a mesh with named lines."""
-    segments, places = mesh.segments, mesh.places + 1e-9
+    segments, places = mesh.segments, mesh.positions + 1e-9
     layers = np.array([layer_of(shape, float(s)) for s in places])
     lines = [("line", segments[layers == name]) for name in ("FILM", "PRESSURE")]
     cells = [("quad", changes.get("quads", mesh.quads)), *lines, *changes.get("more", [])]
@@ -240,14 +240,14 @@ def test_a_mesh_from_a_file_is_that_mesh(name: str, mirror: float, tmp_path: Pat
     assert np.sort(corner_jacobians(found)) == pytest.approx(np.sort(corner_jacobians(mesh)))
     assert found.length == pytest.approx(mesh.length, rel=2e-3)
     assert found.points[found.boundary] == pytest.approx(
-        found_shape.outline.at(found.places), abs=1e-9
+        found_shape.outline.at(found.positions), abs=1e-9
     )
     assert found_shape.film[0] == 0.0
-    assert found_shape.film[1] == pytest.approx(found.places[found.arc])
+    assert found_shape.film[1] == pytest.approx(found.positions[found.arc])
     assert len(found.regions["rubber"]) == len(mesh.quads)
     fine = finer(found, 3)
     assert corner_jacobians(fine).min() > 0.9 * corner_jacobians(found).min()
-    assert fine.places[::3] == pytest.approx(found.places)
+    assert fine.positions[::3] == pytest.approx(found.positions)
     assert len(fine.regions["rubber"]) == 9 * len(found.quads)
     assert fine.points[fine.boundary[::3]] == pytest.approx(found.points[found.boundary])
 

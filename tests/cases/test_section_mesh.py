@@ -43,8 +43,8 @@ def test_the_mesh_of_any_outline_is_sound_and_passes_the_patch_test(number: int)
     x, after = mesh.points[mesh.segments].transpose(1, 0, 2)
     area = 0.5 * float((x[:, 0] * after[:, 1] - after[:, 0] * x[:, 1]).sum())
     assert area == pytest.approx(outline.area, rel=3e-3)
-    assert mesh.points[mesh.boundary] == pytest.approx(outline.at(mesh.places), abs=1e-11)
-    assert mesh.places[[0, mesh.arc]] == pytest.approx(layout.film)
+    assert mesh.points[mesh.boundary] == pytest.approx(outline.at(mesh.positions), abs=1e-11)
+    assert mesh.positions[[0, mesh.arc]] == pytest.approx(layout.film)
     assert imbalance(mesh, (0.2, -0.1)) < 1e-10
 
 
@@ -66,7 +66,7 @@ def test_a_circle_has_the_same_mesh_wherever_its_outline_begins(begin: float) ->
     mesh = section_mesh(shapes[0], film, Sizes(33, None, 0.02), 1)
     moved = section_mesh(shapes[1], (film[0] - begin, film[1] - begin), Sizes(33, None, 0.02), 1)
     assert moved.points == pytest.approx(mesh.points, abs=1e-12)
-    assert moved.places + begin == pytest.approx(mesh.places, abs=1e-12)
+    assert moved.positions + begin == pytest.approx(mesh.positions, abs=1e-12)
 
 
 def test_a_density_that_has_no_mesh_is_refused() -> None:

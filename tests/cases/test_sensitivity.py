@@ -224,7 +224,7 @@ def test_an_edge_moves_as_the_film_does() -> None:
         moved = case.scaled("housing_diameter", factor)
         y = solved(moved, x)
         h, level = moved.system.arc_film(y)[1], 3.0 * quantities(moved, y)["h_star"].value
-        return interval_below(moved.system.section.places, h, level)
+        return interval_below(moved.system.section.positions, h, level)
 
     found = {"sealed": sealed.moved, "air": air.moved, **quantities(case, x)}
     slopes = frozen_slopes(case, x, SuperLU(), {"d": case.rate("housing_diameter")}, found)
@@ -255,12 +255,14 @@ def test_edges_and_corners_hold_the_mesh() -> None:
     case, x = state("section rectangular")
     mesh, outline = case.system.mesh, case.system.section.layout.shape.outline
     found = edges(case, x, quantities(case, x)["h_star"].value)
-    places = mesh.places[: mesh.arc + 1]
+    places = mesh.positions[: mesh.arc + 1]
     rest = [0, mesh.arc, *np.flatnonzero(np.isclose(places[:, None], outline.kinks).any(axis=1))]
     for k, velocity in enumerate(velocities(case, found)):
         speed = np.linalg.norm(velocity[mesh.arc_nodes], axis=1)
         assert speed[rest] == pytest.approx(0.0, abs=1e-12)
-        at = [int(np.argmin(np.abs(case.system.section.places - edge.place))) for edge in found]
+        at = [
+            int(np.argmin(np.abs(case.system.section.positions - edge.position))) for edge in found
+        ]
         assert speed[at] == pytest.approx([float(k == other) for other in range(len(found))])
 
 

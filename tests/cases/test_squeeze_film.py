@@ -121,7 +121,7 @@ def test_masses_add_up_to_what_a_wider_gap_holds(dry: DryContact) -> None:
 def test_tangents_are_those_of_the_residuals(begun: tuple[Relaxed, Array]) -> None:
     """Of the whole problem and of its layer, by central differences; both agree in the layer."""
     problem, start = begun
-    start[problem.own] += 0.1  # away from where the film begins to cavitate
+    start[problem.interior] += 0.1  # away from where the film begins to cavitate
     m, dx = len(problem.shared), np.zeros_like(start)
     dx[problem.shared] = 1e-7 * np.random.default_rng(3).standard_normal(m)
     dx[problem.problem.fixed] = 0.0
@@ -131,10 +131,10 @@ def test_tangents_are_those_of_the_residuals(begun: tuple[Relaxed, Array]) -> No
     small = 0.5 * (problem.layer_residual(start + dx) - problem.layer_residual(start - dx))
     _, L = problem.layer_linearise(start)
     assert np.linalg.norm(L.shared @ dx[problem.shared] - small) < 1e-5 * np.linalg.norm(small)
-    assert small[m:] == pytest.approx(change[problem.own], rel=1e-9, abs=1e-12)
+    assert small[m:] == pytest.approx(change[problem.interior], rel=1e-9, abs=1e-12)
     # and the term counts: without it the tangent is another one
     assert np.linalg.norm(np.asarray(problem.term @ dx)) > 1e-2 * np.linalg.norm(
-        change[problem.own]
+        change[problem.interior]
     )
 
 
@@ -157,7 +157,7 @@ def test_an_implicit_step_conserves_what_the_film_holds(
     """Outflow minus inflow is what the film has lost, by the local time steps."""
     system, start = dry.system, pressed_film(dry.system, dry.x, 3.0)
     step = squeeze_film.step(start, 0.3, 0.0)
-    solution = FilmCorrectors.of(system, dry.newton).whole().solve(step, start)
+    solution = FilmCorrectors.of(system, dry.newton).monolithic().solve(step, start)
     assert solution.converged, solution.message
     rows = np.setdiff1d(system.layout.dofs("pressure"), step.problem.fixed)
     fluxes = np.add.reduce(step.problem.residual(solution.x)[rows])

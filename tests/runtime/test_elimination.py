@@ -52,7 +52,7 @@ def check(A: np.ndarray, m: int) -> None:
 def test_pieces_are_solved_like_the_whole(order: int, fields: int, ends: bool) -> None:
     A = chain(order, fields, ends=ends)
     check(A, SHARED)
-    assert len(elimination(A, SHARED).rest) < 0.5 * (len(A) - SHARED) + SHARED
+    assert len(elimination(A, SHARED).remaining) < 0.5 * (len(A) - SHARED) + SHARED
 
 
 @pytest.mark.parametrize("width", [0, 1, 2, 5, 79])
@@ -63,7 +63,7 @@ def test_a_band_of_any_width_is_solved(width: int) -> None:
 def test_pieces_end_where_few_unknowns_are_between_them() -> None:
     first, *_ = elimination(chain(4, 2, ends=False), SHARED).levels
     assert first.inner.shape == (SEGMENTS, 6)
-    assert first.known.shape == (SEGMENTS, 2 + 4)
+    assert first.boundary.shape == (SEGMENTS, 2 + 4)
 
 
 def test_a_singular_piece_is_left_to_the_whole() -> None:

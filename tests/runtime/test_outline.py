@@ -60,7 +60,7 @@ def test_measures_of_a_stadium_and_a_triangle() -> None:
 def test_places_and_points_belong_together() -> None:
     for shape in (RING, stadium(0.7, 0.4), Outline(rounded(SQUARE, [0.0, 0.3, 0.5, 0.1]))):
         s = np.linspace(0.0, shape.length, 333, endpoint=False)
-        assert shape.place(shape.at(s)) == pytest.approx(s, abs=1e-12)
+        assert shape.position(shape.at(s)) == pytest.approx(s, abs=1e-12)
         step = 1e-6
         slope = (shape.at(s + 0.5 * step) - shape.at(s - 0.5 * step)) / step
         smooth = np.abs((s[:, None] - shape.kinks + 1e-5) % shape.length).min(initial=1, axis=1)
@@ -69,7 +69,7 @@ def test_places_and_points_belong_together() -> None:
 
 
 def test_a_point_beside_the_outline_gets_the_nearest_place() -> None:
-    places = stadium(0.7, 0.4).place(np.array([[0.0, -5.0], [0.2, -0.3], [9.0, 0.0]]))
+    places = stadium(0.7, 0.4).position(np.array([[0.0, -5.0], [0.2, -0.3], [9.0, 0.0]]))
     assert places == pytest.approx([0.7, 0.9, 1.4 + 0.2 * pi])
 
 

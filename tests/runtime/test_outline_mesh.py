@@ -58,11 +58,11 @@ def test_the_boundary_lies_on_the_outline_at_its_places(name: str) -> None:
     mesh = mesh_of(shape, 2)
     assert mesh.arc == 66
     assert mesh.length == shape.outline.length
-    assert mesh.points[mesh.boundary] == pytest.approx(shape.outline.at(mesh.places), abs=1e-12)
-    assert mesh.places[[0, mesh.arc]] == pytest.approx(shape.film)
-    assert (np.diff(mesh.places) > 0.0).all()
+    assert mesh.points[mesh.boundary] == pytest.approx(shape.outline.at(mesh.positions), abs=1e-12)
+    assert mesh.positions[[0, mesh.arc]] == pytest.approx(shape.film)
+    assert (np.diff(mesh.positions) > 0.0).all()
     for corner in shape.outline.kinks:
-        away = (mesh.places - corner + 1e-9) % mesh.length
+        away = (mesh.positions - corner + 1e-9) % mesh.length
         assert away.min() < 1e-8
 
 
@@ -72,14 +72,14 @@ def test_the_nodes_of_the_film_are_where_the_spacing_has_them() -> None:
     spacing = graded(length, (Spot(1.0), Spot(3.0)), 2 * 33, coarsest=length / 12, rate=0.3)
     mesh = outline_mesh(shape, shape.film, spacing, 33, 2)
     expected = shape.film[0] + length * spacing(np.arange(67) / 66)
-    assert mesh.places[:67] == pytest.approx(expected, abs=1e-12)
+    assert mesh.positions[:67] == pytest.approx(expected, abs=1e-12)
     assert corner_jacobians(mesh).min() >= 0.3
 
 
 def test_a_mesh_of_twice_the_density_is_of_the_same_family() -> None:
     coarse, fine = mesh_of(SHAPES["horn"], 2), mesh_of(SHAPES["horn"], 4)
     assert len(fine.quads) == 4 * len(coarse.quads)
-    assert fine.places[::2] == pytest.approx(coarse.places, abs=1e-12)
+    assert fine.positions[::2] == pytest.approx(coarse.positions, abs=1e-12)
 
 
 def test_a_density_that_does_not_divide_the_segments_is_named() -> None:

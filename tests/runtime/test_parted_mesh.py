@@ -54,10 +54,10 @@ def test_both_regions_are_filled_and_joined(density: int | Fraction) -> None:
 @pytest.mark.parametrize("density", DENSITIES)
 def test_its_boundary_is_the_outline_and_its_cut_is_straight(density: int | Fraction) -> None:
     mesh, outline = mesh_of(density), SHAPE.outline
-    assert mesh.points[mesh.boundary] == pytest.approx(outline.at(mesh.places), abs=1e-12)
-    assert mesh.places[0] == SHAPE.film[0]
-    assert np.diff(mesh.places).min() > 0.0
-    assert mesh.places[-1] < mesh.places[0] + mesh.length
+    assert mesh.points[mesh.boundary] == pytest.approx(outline.at(mesh.positions), abs=1e-12)
+    assert mesh.positions[0] == SHAPE.film[0]
+    assert np.diff(mesh.positions).min() > 0.0
+    assert mesh.positions[-1] < mesh.positions[0] + mesh.length
     shared = np.intersect1d(mesh.quads[mesh.regions[CAP]], mesh.quads[mesh.regions[BODY]])
     assert mesh.points[shared, 1] == pytest.approx(25.7, abs=1e-9)
     below = mesh.quads[mesh.regions[CAP]]

@@ -43,7 +43,7 @@ def answer(load: float) -> Array:
 
 @dataclass(frozen=True)
 class Chain:
-    """Body: a chain of springs with a cubic part; layer: exp of the shared and its own unknowns.
+    """Body: a chain of springs with a cubic part; layer: exp of the shared and interior unknowns.
 
     softening: size of the cubic part, by which the body differs from its stale tangent.
     """
@@ -52,7 +52,7 @@ class Chain:
     softening: float = 0.1
     asked: list[str] = field(default_factory=list)
     shared: np.ndarray[Any, np.dtype[np.int64]] = field(default_factory=lambda: SHARED)
-    own: np.ndarray[Any, np.dtype[np.int64]] = field(default_factory=lambda: OWN)
+    interior: np.ndarray[Any, np.dtype[np.int64]] = field(default_factory=lambda: OWN)
 
     def _springs(self) -> Array:
         A = 3.0 * np.eye(N) - np.eye(N, k=1) - 0.8 * np.eye(N, k=-1)
@@ -254,7 +254,7 @@ def test_newton_ends_what_rounding_holds_up(error: float, converged: bool) -> No
     object.__setattr__(problem, "error", error)
     iteration = ModifiedNewton(contraction=1e-3, window=1)  # slow as soon as nothing is gained
     without, solution = (
-        SchurCorrector(SuperLU(), iteration, near=1e3, finish=newton).solve(
+        SchurCorrector(SuperLU(), iteration, threshold=1e3, finish=newton).solve(
             problem, 0.99 * answer(1.0)
         )
         for newton in (None, finish)
@@ -294,7 +294,7 @@ def test_newton_goes_on_where_a_wall_of_the_body_stalls_the_iteration(
     problem = Walled(-1.0)  # the node touches the wall at the answer
     assert answer(-1.0)[Walled.node] > 0.0
     finish = Newton(max_iterations=1)
-    solution = SchurCorrector(SuperLU(), near=1e3, finish=finish, stalled=stalled).solve(
+    solution = SchurCorrector(SuperLU(), threshold=1e3, finish=finish, stalled=stalled).solve(
         problem, 0.9 * answer(-1.0)
     )
     assert solution.converged is converged

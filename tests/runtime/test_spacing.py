@@ -45,7 +45,7 @@ def test_a_larger_rate_makes_the_finest_segment_finer() -> None:
 def test_a_spot_may_be_given_finer_segments() -> None:
     spots = (Spot(0.4, 3.0), Spot(1.8))
     nodes = LENGTH * graded(LENGTH, spots, COUNT, coarsest=0.1, rate=0.25)(np.arange(865) / 864)
-    at = [np.diff(nodes)[np.abs(nodes[1:] - spot.place).argmin()] for spot in spots]
+    at = [np.diff(nodes)[np.abs(nodes[1:] - spot.position).argmin()] for spot in spots]
     assert at[0] / at[1] == pytest.approx(3.0, rel=0.1)
 
 

@@ -74,7 +74,7 @@ def test_places_carry_the_boundary(name: str) -> None:
     old, new = meshes(name)
 
     def wave(mesh: SectionMesh) -> np.ndarray:
-        return np.asarray(np.cos(2.0 * np.pi * mesh.places / mesh.length))
+        return np.asarray(np.cos(2.0 * np.pi * mesh.positions / mesh.length))
 
     assert transfer_boundary(old, new, wave(old)) == pytest.approx(wave(new), abs=0.01)
     for part in ("arc_nodes", "outer_nodes"):

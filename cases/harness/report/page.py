@@ -56,17 +56,17 @@ def _require_written(rows: CurveFolder[Any], content: Mapping[str, Any], name: s
     run that is under way: its curve is written before its run.json.
     """
     states = [state for state in content.get(name, ()) if isinstance(state, dict)]
-    doubts = {row.key: disbelief(rows.path, row, states) for row in rows.rows}
+    faults = {row.key: disbelief(rows.path, row, states) for row in rows.rows}
     name_of_key = rows.kind.key_column().name
-    lost = [s[name_of_key] for s in states if s.get(name_of_key) not in doubts]
-    wrong = [(key, doubt) for key, doubt in doubts.items() if doubt]
+    lost = [s[name_of_key] for s in states if s.get(name_of_key) not in faults]
+    invalid = [(key, doubt) for key, doubt in faults.items() if doubt]
     count = Counter(row.key for row in rows.rows)
-    wrong += [(key, "it is there twice") for key, times in count.items() if times > 1]
-    wrong += [(key, "its row or a file of it is missing") for key in lost]
-    if wrong and content.get("status") != "running":
-        (key, doubt), *_ = wrong
+    invalid += [(key, "it is there twice") for key, times in count.items() if times > 1]
+    invalid += [(key, "its row or a file of it is missing") for key in lost]
+    if invalid and content.get("status") != "running":
+        (key, doubt), *_ = invalid
         raise BadInput(f"{rows.path}: {rows.kind.label(key)}: {doubt}; {_AGAIN}")
-    rows.rows = [row for row in rows.rows if not doubts[row.key]]
+    rows.rows = [row for row in rows.rows if not faults[row.key]]
 
 
 def write_page(
@@ -90,11 +90,11 @@ def parts_of(runs: Sequence[FinishedRun]) -> list[Part]:
         if not run.rows:
             raise BadInput(f"{run.folder} has no result yet: nothing to report")
     try:
-        own = list(runs[0].case.report(runs))
+        case_parts = list(runs[0].case.report(runs))
     except ImportError as error:
         raise BadInput(f"{_MISSING} ({error})") from None
     several = [_side_by_side(runs)] if len(runs) > 1 else []
-    parts = [*_answers(runs), asked(runs), *several, *own, *left_out(runs[0].case)]
+    parts = [*_answers(runs), input_part(runs), *several, *case_parts, *left_out(runs[0].case)]
     return [*parts, _all_rows(runs), all_keys(runs), versions(runs)]
 
 
@@ -110,12 +110,12 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str = "") 
     plots = {f"{i}-{k}": plot for i, part in enumerate(parts) for k, plot in enumerate(part.plots)}
     script, divs = components(plots) if plots else ("", {})
     # Bokeh's own scripts alone: `render` adds those of any package that was imported beside
-    own = Resources(mode="inline", components=["bokeh", "bokeh-widgets"]).js_raw
-    needed = JS_RESOURCES.render(js_raw=own, js_files=[]) if plots else ""
+    scripts = Resources(mode="inline", components=["bokeh", "bokeh-widgets"]).js_raw
+    needed = JS_RESOURCES.render(js_raw=scripts, js_files=[]) if plots else ""
     page = Environment(
         loader=FileSystemLoader(_HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    page.filters["shown"] = shown
+    page.filters["shown"] = cell_text
     page.tests["alarm"] = lambda line: isinstance(line, Alarm)
     page.filters["base64"] = lambda data: base64.b64encode(data).decode()
     return page.get_template("report.html").render(
@@ -131,17 +131,17 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str = "") 
 def _title(runs: Sequence[FinishedRun]) -> str:
     """Title that names the runs, each kind once; what all of them show stands once, at its end."""
     titles = dict.fromkeys(run.case.titled(run.parameters) for run in runs)
-    subjects, shown = zip(*(title.partition(": ")[::2] for title in titles), strict=True)
-    same = len(set(shown)) == 1 and bool(shown[0])
-    return f"{' and '.join(subjects)}: {shown[0]}" if same else "; ".join(titles)
+    subjects, details = zip(*(title.partition(": ")[::2] for title in titles), strict=True)
+    same = len(set(details)) == 1 and bool(details[0])
+    return f"{' and '.join(subjects)}: {details[0]}" if same else "; ".join(titles)
 
 
-def capital(words: str) -> str:
+def capital(text: str) -> str:
     """Words that begin with a capital letter, all else as it is."""
-    return words[:1].upper() + words[1:]
+    return text[:1].upper() + text[1:]
 
 
-def shown(value: Cell | None) -> str:
+def cell_text(value: Cell | None) -> str:
     """A cell in words: four digits of a number, nothing where it is not known."""
     if value is None or (isinstance(value, float) and not isfinite(value)):
         return ""
@@ -161,8 +161,8 @@ def write_xlsx(parts: Sequence[Part], path: Path) -> None:
         names[name] = names.get(name, 0) + 1
         sheet = book.create_sheet(name if names[name] == 1 else f"{name} {names[name]}")
         for row in ([table.caption], table.header, *table.rows):
-            known = [isinstance(c, str) or (c is not None and isfinite(c)) for c in row]
-            sheet.append([c if good else None for c, good in zip(row, known, strict=True)])
+            finite = [isinstance(c, str) or (c is not None and isfinite(c)) for c in row]
+            sheet.append([c if good else None for c, good in zip(row, finite, strict=True)])
         for cell in (cell for cells in sheet.iter_rows() for cell in cells):
             if isinstance(cell.value, str):  # never a formula, also where somebody edits it
                 cell.data_type = "s"
@@ -180,19 +180,19 @@ def _answers(runs: Sequence[FinishedRun]) -> list[Part]:
     lines = [
         type(line)(f"{run.name}: {line.strip()}" if several else line.strip())
         for run in runs
-        for line in _answer(run)
+        for line in _summary(run)
     ]
     return [Part("Answer", lines=lines)] if lines else []
 
 
-def _answer(run: FinishedRun) -> list[str]:
+def _summary(run: FinishedRun) -> list[str]:
     """The answer of a run, then what it rests on: notes, warnings, assumptions, measurements."""
-    answer = run.answer
-    if not answer:
+    summary = run.summary
+    if not summary:
         return []
     assumed = run.content.get("assumed") or ()
     return [
-        *answer,
+        *summary,
         *run.case.notes(run.rows, advice_of(run.content, run.rows)),
         *(run.content.get("warnings") or ()),
         *([f"assumed: {', '.join(assumed)}"] if assumed else []),
@@ -205,27 +205,27 @@ def left_out(case: AnyCase) -> list[Part]:
     return [Part("What the model leaves out", lines=case.left_out)] if case.left_out else []
 
 
-def asked(runs: Sequence[FinishedRun], without: Collection[str] = ()) -> Part:
+def input_part(runs: Sequence[FinishedRun], without: Collection[str] = ()) -> Part:
     """The keys that are not at their defaults, with units and meaning, a column for each run.
 
     without: keys that are told elsewhere.
     """
     default = runs[0].case.parameters().model_dump()
-    given = [run.parameters.model_dump() for run in runs]
+    values = [run.parameters.model_dump() for run in runs]
     rows = [
-        (key.name, *(_text(g[key.name]) for g in given), key.unit, key.meaning)
+        (key.name, *(_text(g[key.name]) for g in values), key.unit, key.meaning)
         for key in keys_of(runs[0].case.parameters)
-        if key.name not in without and any(g[key.name] != default[key.name] for g in given)
+        if key.name not in without and any(g[key.name] != default[key.name] for g in values)
     ]
     header = ("key", *(run.name for run in runs), "unit", "meaning")
-    words = "Every key is at its default." if not rows else ""
+    text = "Every key is at its default." if not rows else ""
     table = Table("Keys that are not at their defaults", header, rows)
     status = [
         f"{run.name}: {run.content.get('status')} {run.content.get('message') or ''}"
         for run in runs
         if run.content.get("status") != "converged"
     ]
-    return Part("What was asked", words, tables=[table] if rows else [], lines=status)
+    return Part("What was asked", text, tables=[table] if rows else [], lines=status)
 
 
 def _side_by_side(runs: Sequence[FinishedRun]) -> Part:
@@ -238,22 +238,22 @@ def _side_by_side(runs: Sequence[FinishedRun]) -> Part:
         if c.head and heads[c.head] == 1 and c.kind is float and c.unit != "%"
     ]
     key = first.case.row.key_column()
-    found = [{row.key: row for row in run.rows} for run in runs]
-    common = [row.key for row in first.rows if all(row.key in rows for rows in found[1:])]
+    rows_by_key = [{row.key: row for row in run.rows} for run in runs]
+    common = [row.key for row in first.rows if all(row.key in rows for rows in rows_by_key[1:])]
     tables = []
     for column in columns:
         if column.name == key.name:
             continue
         rows: list[list[Cell]] = []
         for at in common:
-            values = [float(getattr(rows[at], column.name)) for rows in found]
+            values = [float(getattr(rows[at], column.name)) for rows in rows_by_key]
             changes = [_percent(v, values[0]) for v in values[1:]]
             rows.append([at, *values, *changes])
         header = [f"{key.head} [{key.unit}]", *(run.name for run in runs)]
         header += [f"{run.name}, difference in %" for run in others]
         tables.append(Table(f"{column.title}: {column.meaning}", header, rows))
-    words = "" if common else "The runs share no row."
-    return Part("Side by side", words, tables=tables if common else [])
+    text = "" if common else "The runs share no row."
+    return Part("Side by side", text, tables=tables if common else [])
 
 
 def _percent(value: float, reference: float) -> float:
@@ -270,9 +270,9 @@ def _all_rows(runs: Sequence[FinishedRun]) -> Part:
 
 def all_keys(runs: Sequence[FinishedRun]) -> Part:
     """Every key with its value."""
-    given = [run.parameters.model_dump() for run in runs]
+    values = [run.parameters.model_dump() for run in runs]
     rows = [
-        (key.name, *(_text(g[key.name]) for g in given), key.unit, key.bounds, key.meaning)
+        (key.name, *(_text(g[key.name]) for g in values), key.unit, key.bounds, key.meaning)
         for key in keys_of(runs[0].case.parameters)
     ]
     header = ("key", *(run.name for run in runs), "unit", "allowed", "meaning")
@@ -281,10 +281,10 @@ def all_keys(runs: Sequence[FinishedRun]) -> Part:
 
 def versions(runs: Sequence[FinishedRun]) -> Part:
     """Versions of what computed the runs."""
-    told = [run.content.get("versions") or {} for run in runs]
-    names = dict.fromkeys(name for found in told for name in found)
-    rows = [(name, *(str(found.get(name) or "") for found in told)) for name in names]
-    rows.append(("seconds", *(shown(run.content.get("seconds")) for run in runs)))
+    versions_by_run = [run.content.get("versions") or {} for run in runs]
+    names = dict.fromkeys(name for entry in versions_by_run for name in entry)
+    rows = [(name, *(str(entry.get(name) or "") for entry in versions_by_run)) for name in names]
+    rows.append(("seconds", *(cell_text(run.content.get("seconds")) for run in runs)))
     table = Table("Versions", ("", *(run.name for run in runs)), rows)
     return Part("Versions", tables=[table], folded=True)
 

@@ -69,9 +69,9 @@ class FinishedRun:
         return self.folder.resolve().name
 
     @property
-    def answer(self) -> list[str]:
+    def summary(self) -> list[str]:
         """The main results in words; those of a run that goes on are of the rows so far."""
-        lines: list[str] = self.case.answer(self.parameters, self.rows)
+        lines: list[str] = self.case.summary(self.parameters, self.rows)
         if lines and self.content.get("status") == "running":
             lines[0] = type(lines[0])(f"so far, of {len(self.rows)} states: {lines[0].strip()}")
         return lines

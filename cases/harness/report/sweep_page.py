@@ -12,7 +12,7 @@ from typing import Any
 from softehl.cases.harness.case import AnyCase, find_named_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
-from softehl.cases.harness.report.page import asked, capital, left_out, read_finished
+from softehl.cases.harness.report.page import capital, input_part, left_out, read_finished
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
 from softehl.cases.harness.responses import titled, titled_value
 from softehl.runtime.io import Cell, read_json
@@ -49,7 +49,7 @@ class FinishedSweep:
         """The numbers that runs are judged by."""
         return list(dict.fromkeys(name for point in self.points for name in point.merits))
 
-    def words(self, point: Point, keys: Sequence[str]) -> str:
+    def values_text(self, point: Point, keys: Sequence[str]) -> str:
         """The values of some keys of a run in words."""
         return ", ".join(titled_value(_plain(k), point.values[k], self.keys[k]) for k in keys)
 
@@ -75,11 +75,11 @@ def read_sweep(folder: Path, shipped: Mapping[str, str]) -> FinishedSweep:
     except (OSError, ValueError, KeyError, TypeError) as error:
         reason = " ".join(str(error).split())[:120]
         raise BadInput(f"{folder} holds no sweep that can be read: {reason}") from None
-    found = [point.run for point in points if point.run is not None and point.run.rows]
-    if not found:
+    runs = [point.run for point in points if point.run is not None and point.run.rows]
+    if not runs:
         raise BadInput(f"{folder} has no result yet: nothing to report")
     names = " and ".join(map(_plain, keys))
-    return FinishedSweep(case, keys, points, f"{case.titled(found[0].parameters)}; over {names}")
+    return FinishedSweep(case, keys, points, f"{case.titled(runs[0].parameters)}; over {names}")
 
 
 def sweep_parts(sweep: FinishedSweep) -> list[Part]:
@@ -99,7 +99,7 @@ def _same(sweep: FinishedSweep) -> Part:
     first, *others = (run.parameters.model_dump() for run in runs)
     differ = [key for key in first if any(other[key] != first[key] for other in others)]
     named = replace(runs[0], folder=Path("all runs"), content={"status": "converged"})
-    return asked([named], without=[*differ, *sweep.keys])
+    return input_part([named], without=[*differ, *sweep.keys])
 
 
 def _point(
@@ -130,20 +130,25 @@ def _best(sweep: FinishedSweep) -> Part:
     """The runs with the least and the largest number of each kind."""
     rows: list[Sequence[Cell]] = []
     for name in sweep.names:
-        known = [p for p in sweep.points if isfinite(p.merit(name))]
-        if not known:
+        finite = [p for p in sweep.points if isfinite(p.merit(name))]
+        if not finite:
             continue
-        best = min(known, key=lambda p: p.merit(name) * sweep.case.sense(name))
-        worst = max(known, key=lambda p: p.merit(name) * sweep.case.sense(name))
+        best = min(finite, key=lambda p: p.merit(name) * sweep.case.sense(name))
+        worst = max(finite, key=lambda p: p.merit(name) * sweep.case.sense(name))
         cells = [
             cell
             for p in (best, worst)
-            for cell in (p.merit(name), f"{sweep.words(p, list(sweep.keys))} (run {p.number})")
+            for cell in (
+                p.merit(name),
+                f"{sweep.values_text(p, list(sweep.keys))} (run {p.number})",
+            )
         ]
         rows.append((name, *cells))
     table = Table("Of all runs with a result", ("", "best", "at", "worst", "at"), rows)
-    wrong = [p for p in sweep.points if p.status != "converged"]
-    lines = [f"run {p.number}, {sweep.words(p, list(sweep.keys))}: {p.status}" for p in wrong]
+    failed = [p for p in sweep.points if p.status != "converged"]
+    lines = [
+        f"run {p.number}, {sweep.values_text(p, list(sweep.keys))}: {p.status}" for p in failed
+    ]
     return Part("Best and worst", tables=[table], lines=lines)
 
 
@@ -151,12 +156,12 @@ def _pivot(sweep: FinishedSweep, name: str) -> Table:
     """A number over the last key (columns) and all others (rows)."""
     *others, last = sweep.keys
     columns = list(dict.fromkeys(p.values[last] for p in sweep.points))
-    found: dict[str, dict[Cell, float]] = {}
+    cells_by_row: dict[str, dict[Cell, float]] = {}
     for p in sweep.points:
-        found.setdefault(sweep.words(p, others), {})[p.values[last]] = p.merit(name)
+        cells_by_row.setdefault(sweep.values_text(p, others), {})[p.values[last]] = p.merit(name)
     header = ("", *(titled_value(_plain(last), value, sweep.keys[last]) for value in columns))
     rows: list[Sequence[Cell]] = [
-        (words, *(cells.get(c, nan) for c in columns)) for words, cells in found.items()
+        (label, *(cells.get(c, nan) for c in columns)) for label, cells in cells_by_row.items()
     ]
     return Table(name, header, rows)
 
@@ -174,12 +179,12 @@ def _plot(sweep: FinishedSweep, name: str) -> Any:
     for p in sweep.points:
         if isfinite(p.merit(name)):
             at = p.values[first] if numbers else str(p.values[first])
-            lines.setdefault(sweep.words(p, others), []).append((at, p.merit(name)))
-    for number, (words, points) in enumerate(lines.items()):
+            lines.setdefault(sweep.values_text(p, others), []).append((at, p.merit(name)))
+    for number, (label, points) in enumerate(lines.items()):
         x, y = zip(*(sorted(points) if numbers else points), strict=True)
         look: dict[str, Any] = {"color": COLOURS[number % len(COLOURS)]}
-        if words and len(lines) <= len(COLOURS):
-            look["legend_label"] = words
+        if label and len(lines) <= len(COLOURS):
+            look["legend_label"] = label
         panel.line(x, y, **look)
         panel.scatter(x, y, size=6, **look)
     if panel.legend:

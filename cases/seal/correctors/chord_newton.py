@@ -40,7 +40,7 @@ class LayeredProblem(NonlinearProblem, Protocol):
         ...
 
     @property
-    def own(self) -> Integers:
+    def interior(self) -> Integers:
         """Unknowns (k,) that only the layer has, numbered along it."""
         ...
 
@@ -110,7 +110,7 @@ class CondensedSystem:
         """Size of r as a part of a full residual."""
         full, m = np.zeros_like(self.at.x), len(self.problem.shared)
         full[self.problem.shared] = r[:m]
-        full[self.problem.own] = r[m:]
+        full[self.problem.interior] = r[m:]
         return residual_size(self.problem, full)
 
     def step(self, r: Array, L: Parts) -> Array:
@@ -118,7 +118,7 @@ class CondensedSystem:
         x, m = solved(self.schur, L, r), len(self.problem.shared)
         step = np.zeros_like(self.at.x)
         step[self.problem.shared] = -x[:m]
-        step[self.problem.own] = -x[m:]
+        step[self.problem.interior] = -x[m:]
         if not np.isfinite(step).all():
             raise SingularMatrix("the condensed system has no finite solution")
         return step
@@ -163,7 +163,7 @@ class AndersonMixing:
         """Add x with its residual r, both (n,)."""
         problem, body = self.problem, r.copy()
         body[problem.shared] -= problem.layer_residual(x)[: len(problem.shared)]
-        body[problem.own] = 0.0
+        body[problem.interior] = 0.0
         self.iterates.append(Iterate(x, r, body))
         del self.iterates[: -self.depth - 1]
 
@@ -239,9 +239,9 @@ class ModifiedNewton:
             history.add(x, problem.residual(x))
             norms.append(residual_size(problem, history.latest.r))
 
-    def _exhausted(self, before: float, norm: float) -> bool:
+    def _exhausted(self, previous: float, norm: float) -> bool:
         """True if nothing but rounding is left."""
-        return 0.5 * before < norm <= self.stagnation * self.tolerance
+        return 0.5 * previous < norm <= self.stagnation * self.tolerance
 
     def _target(self, norm: float) -> float:
         return max(0.1 * self.tolerance, self.inner_gain * norm)
@@ -257,8 +257,8 @@ class ModifiedNewton:
         if len(norms) > self.max_outer:
             return Status.MAX_ITERATIONS
         # the first norm is that of the start, which the layer had not met yet
-        before = len(norms) - 1 - self.window
-        if before >= 1 and norms[-1] > self.contraction**self.window * norms[before]:
+        index = len(norms) - 1 - self.window
+        if index >= 1 and norms[-1] > self.contraction**self.window * norms[index]:
             return Status.MAX_ITERATIONS
         return None
 
@@ -274,7 +274,7 @@ class ModifiedNewton:
         if y is None:
             return None
         dx = -condensed.extend(reduced, (at.x - y)[problem.shared])
-        dx[problem.own] = (y - at.x)[problem.own]
+        dx[problem.interior] = (y - at.x)[problem.interior]
         return np.asarray(at.x + dx)
 
     def _inner(
@@ -285,14 +285,14 @@ class ModifiedNewton:
         cautious: whether its steps are shortened where they make the residual larger, which
         hinders as often as it helps.
         """
-        best, least, before, wild = x, math.inf, math.inf, 0
+        best, lowest, last_norm, wild = x, math.inf, math.inf, 0
         for _ in range(self.max_inner):
             r, L = inner.linearise(x)
             norm = inner.norm(r)
-            if norm < least:
-                best, least = x, norm
-            wild = wild + 1 if norm > _WILD * least and not cautious else 0
-            ended = self._exhausted(before, norm) or wild == _WILD_STEPS
+            if norm < lowest:
+                best, lowest = x, norm
+            wild = wild + 1 if norm > _WILD * lowest and not cautious else 0
+            ended = self._exhausted(last_norm, norm) or wild == _WILD_STEPS
             if norm <= target or ended or not math.isfinite(norm):
                 break
             try:
@@ -301,10 +301,10 @@ class ModifiedNewton:
                 return None
             fraction = inner.limit(x, step)
             x = _along(inner, x, fraction * step, norm) if cautious else x + fraction * step
-            before = norm
+            last_norm = norm
         # an active set may cycle where the outer iterate is still rough: it need not be exact there
         enough = max(target, self.stagnation * self.tolerance, 0.1 * inner.start)
-        return best if least <= enough else None
+        return best if lowest <= enough else None
 
 
 def _along(inner: CondensedSystem, x: Array, step: Array, norm: float) -> Array:
@@ -312,15 +312,15 @@ def _along(inner: CondensedSystem, x: Array, step: Array, norm: float) -> Array:
 
     A kink of the layer may lie within a step, as where it begins to cavitate.
     """
-    found, least = x, math.inf
+    nearest, lowest = x, math.inf
     for cut in _CUTS:
         y = x + cut * step
         size = inner.norm(inner.residual(y))
-        if size < least:
-            found, least = y, size
-        if least <= _MUCH * norm:
+        if size < lowest:
+            nearest, lowest = y, size
+        if lowest <= _MUCH * norm:
             break
-    return found
+    return nearest
 
 
 def _solution(

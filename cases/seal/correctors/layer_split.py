@@ -59,10 +59,10 @@ class Cut:
         """Data of a tangent with these entries alone. Raises ValueError where it has none there."""
         size = self.m + self.k
         order = np.lexsort((self.rows, self.columns))
-        keys, wanted = self.columns[order] * size + self.rows[order], columns * size + rows
-        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        if not np.array_equal(keys[at], wanted):
-            lost = np.flatnonzero(keys[at] != wanted)[0]
+        keys, requested = self.columns[order] * size + self.rows[order], columns * size + rows
+        at = np.minimum(np.searchsorted(keys, requested), len(keys) - 1)
+        if not np.array_equal(keys[at], requested):
+            lost = np.flatnonzero(keys[at] != requested)[0]
             raise ValueError(
                 f"the layer's tangent has no entry in row {rows[lost]}, column {columns[lost]}; "
                 "add an element that knows both unknowns to the layer"
@@ -98,36 +98,36 @@ class Parts:
 class Layer:
     """The blocks of a layer and a small assembler for them alone.
 
-    shared: (m,) unknowns of the layer that belong to the body too, rising. own: (k,) those that
-    only the layer has. numbers: shared, own, and what is always prescribed, as the assembler
+    shared: (m,) unknowns of the layer that belong to the body too, rising. interior: (k,) those
+    that only the layer has. numbers: shared, own, and what is always prescribed, as the assembler
     counts them.
     """
 
     names: tuple[str, ...]
     shared: Integers
-    own: Integers
+    interior: Integers
     numbers: Integers
     assembler: Assembler
 
     @classmethod
     def of(
-        cls, assembler: Assembler, names: Sequence[str], shared: Integers, own: Integers
+        cls, assembler: Assembler, names: Sequence[str], shared: Integers, interior: Integers
     ) -> Layer:
         """The layer of these blocks; every unknown of them that is not given is prescribed."""
         blocks = [assembler.block(name) for name in names]
         all_of_them = np.unique(np.concatenate([block.dofs.ravel() for block in blocks]))
-        held = np.setdiff1d(all_of_them, np.concatenate([shared, own]))
-        numbers = np.concatenate([np.sort(shared), own, held])
+        constrained = np.setdiff1d(all_of_them, np.concatenate([shared, interior]))
+        numbers = np.concatenate([np.sort(shared), interior, constrained])
         compact = np.full(assembler.size, -1)
         compact[numbers] = np.arange(len(numbers))
         small = [_renumbered(block, compact) for block in blocks]
         build = Assembler.build(len(numbers), small)
-        return cls(tuple(names), np.sort(shared), own, numbers, build)
+        return cls(tuple(names), np.sort(shared), interior, numbers, build)
 
     @property
     def size(self) -> int:
         """Number of unknowns m + k."""
-        return len(self.shared) + len(self.own)
+        return len(self.shared) + len(self.interior)
 
     @cached_property
     def cut(self) -> Cut:
@@ -157,9 +157,9 @@ class Layered:
         return self.layer.shared
 
     @property
-    def own(self) -> Integers:
+    def interior(self) -> Integers:
         """See `LayeredProblem`."""
-        return self.layer.own
+        return self.layer.interior
 
     def residual(self, x: Array) -> Array:
         """See `Problem`."""
@@ -219,5 +219,7 @@ class Layered:
 
     @cached_property
     def _body(self) -> Problem:
-        off = self.problem.with_parameters(**dict.fromkeys(self.layer.names))
-        return off.with_fixed([np.union1d(self.problem.fixed, self.layer.own)], [0.0])
+        without_layer = self.problem.with_parameters(**dict.fromkeys(self.layer.names))
+        return without_layer.with_fixed(
+            [np.union1d(self.problem.fixed, self.layer.interior)], [0.0]
+        )

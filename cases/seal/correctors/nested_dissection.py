@@ -23,13 +23,13 @@ _FEWEST = 6  # pieces that are worth it
 class Level:
     """Pieces that are eliminated at once.
 
-    inner: (G, g) unknowns of the pieces. known: (G, q) the others that a piece knows. Both have n,
-    the number of all unknowns, where a piece has fewer. inside, out, back: places of the entries
+    inner: (G, g) unknowns of the pieces. boundary: (G, q) the others that a piece knows. Both have
+    n, the number of all unknowns, where a piece has fewer. inside, out, back: places of the entries
     inner x inner, inner x known and known x inner. added: where entries known x known go.
     """
 
     inner: Integers
-    known: Integers
+    boundary: Integers
     inside: Integers
     out: Integers
     back: Integers
@@ -41,7 +41,7 @@ class Level:
         solved = np.linalg.solve(entries[self.inside], right)
         change = entries[self.back] @ solved
         np.subtract.at(entries, self.added.ravel(), change[..., :-1].ravel())
-        np.subtract.at(r, self.known.ravel(), change[..., -1].ravel())
+        np.subtract.at(r, self.boundary.ravel(), change[..., -1].ravel())
         return np.asarray(solved)
 
 
@@ -49,17 +49,17 @@ class Level:
 class Elimination:
     """Of n unknowns, the first m of which are outside the chain.
 
-    given: places of the entries of the matrix among all that there will be. count: of these; two
-    more are 0 and 1. rest: unknowns of the dense system, the first m and what is left of the
-    chain. dense: places of its entries, and where they go.
+    data_slots: places of the entries of the matrix among all that there will be. count: of these;
+    two more are 0 and 1. remaining: unknowns of the dense system, the first m and what is left of
+    the chain. dense: places of its entries, and where they go.
     """
 
     m: int
     n: int
     levels: tuple[Level, ...]
-    given: Integers
+    data_slots: Integers
     count: int
-    rest: Integers
+    remaining: Integers
     dense: tuple[Integers, Integers]
 
     @classmethod
@@ -67,31 +67,31 @@ class Elimination:
         """For a matrix (n, n) with entries at these rows and columns."""
         entries = np.append(rows, columns), np.append(columns, rows)
         pattern = _ones(csr_array((np.ones(2 * len(rows)), entries), (n, n)))
-        chain, found = np.arange(m, n), []
+        chain, levels_found = np.arange(m, n), []
         while True:
             pieces = _pieces(pattern, chain)
             if len(pieces) < _FEWEST:
                 break
             ones = np.ones(sum(map(len, pieces)))
             of = np.repeat(np.arange(len(pieces)), [len(piece) for piece in pieces])
-            chosen = csr_array((ones, (of, np.concatenate(pieces))), (len(pieces), n))
-            chain = np.setdiff1d(chain, chosen.indices)
+            selection = csr_array((ones, (of, np.concatenate(pieces))), (len(pieces), n))
+            chain = np.setdiff1d(chain, selection.indices)
             alive = np.zeros(n)
             alive[:m] = alive[chain] = 1.0
-            near = csr_array((chosen @ pattern).multiply(alive[None]))
-            near.eliminate_zeros()
-            found.append((_padded(chosen), _padded(near)))
-            pattern = _ones(csr_array(pattern + near.T @ near))
-        rest = np.append(np.arange(m), chain)
+            adjacency = csr_array((selection @ pattern).multiply(alive[None]))
+            adjacency.eliminate_zeros()
+            levels_found.append((_padded(selection), _padded(adjacency)))
+            pattern = _ones(csr_array(pattern + adjacency.T @ adjacency))
+        remaining = np.append(np.arange(m), chain)
         number = np.full(n, -1)
-        number[rest] = np.arange(len(rest))
+        number[remaining] = np.arange(len(remaining))
         row, column = pattern.nonzero()
         inside = np.flatnonzero((number[row] >= 0) & (number[column] >= 0))
-        to = number[row[inside]] * len(rest) + number[column[inside]]
-        places = _Places.of(pattern)
-        levels = tuple(places.level(inner, known) for inner, known in found)
-        given = places(rows, columns)
-        return cls(m, n, levels, given, pattern.nnz, rest, (inside, to))
+        to = number[row[inside]] * len(remaining) + number[column[inside]]
+        slots = _Places.of(pattern)
+        levels = tuple(slots.level(inner, boundary) for inner, boundary in levels_found)
+        data_slots = slots(rows, columns)
+        return cls(m, n, levels, data_slots, pattern.nnz, remaining, (inside, to))
 
     def solve(self, outside: Array, data: Array, r: Array) -> Array | None:
         """x (n,) of the matrix of these entries, with (m, m) added, for r (n,).
@@ -99,23 +99,23 @@ class Elimination:
         None where it cannot be solved, or a piece cannot be eliminated.
         """
         entries, x, solved = np.zeros(self.count + 2), np.append(r, 0.0), []
-        entries[self.given] = data
+        entries[self.data_slots] = data
         entries[-1] = 1.0
         try:
             for level in self.levels:
                 solved.append(level.eliminate(entries, x))
         except np.linalg.LinAlgError:
             return None
-        A = np.zeros((len(self.rest), len(self.rest)))
+        A = np.zeros((len(self.remaining), len(self.remaining)))
         A.ravel()[self.dense[1]] = entries[self.dense[0]]
         A[: self.m, : self.m] += outside
         factors, pivots, info = lapack.dgetrf(A.T, overwrite_a=True)
         if info:
             return None
-        x[self.rest], _ = lapack.dgetrs(factors, pivots, x[self.rest], trans=1)
-        for level, known in zip(reversed(self.levels), reversed(solved), strict=True):
-            around = np.append(-x[level.known], np.ones((len(known), 1)), axis=1)
-            x[level.inner] = (known @ around[..., None])[..., 0]
+        x[self.remaining], _ = lapack.dgetrs(factors, pivots, x[self.remaining], trans=1)
+        for level, boundary_values in zip(reversed(self.levels), reversed(solved), strict=True):
+            around = np.append(-x[level.boundary], np.ones((len(boundary_values), 1)), axis=1)
+            x[level.inner] = (boundary_values @ around[..., None])[..., 0]
         return x[:-1]
 
 
@@ -135,21 +135,21 @@ class _Places:
         """Places; one after the last of those that there are not."""
         keys = rows * (self.n + 1) + columns
         at = np.searchsorted(self.keys, keys)
-        there = np.append(self.keys, -1)[at] == keys
-        return np.asarray(np.where(there, at, len(self.keys)))
+        stored = np.append(self.keys, -1)[at] == keys
+        return np.asarray(np.where(stored, at, len(self.keys)))
 
-    def level(self, inner: Integers, known: Integers) -> Level:
+    def level(self, inner: Integers, boundary: Integers) -> Level:
         """With 1 on the diagonal where a piece has fewer unknowns."""
         inside = self(inner[:, :, None], inner[:, None, :])
         piece, number = np.nonzero(inner == self.n)
         inside[piece, number, number] = len(self.keys) + 1
         return Level(
             inner,
-            known,
+            boundary,
             inside,
-            self(inner[:, :, None], known[:, None, :]),
-            self(known[:, :, None], inner[:, None, :]),
-            self(known[:, :, None], known[:, None, :]),
+            self(inner[:, :, None], boundary[:, None, :]),
+            self(boundary[:, :, None], inner[:, None, :]),
+            self(boundary[:, :, None], boundary[:, None, :]),
         )
 
 
@@ -171,14 +171,14 @@ def _padded(rows: csr_array) -> Integers:
 
 def _pieces(pattern: csr_array, chain: Integers) -> list[Integers]:
     """Pieces of a chain that know nothing of each other; as few as can be are between them."""
-    own = pattern[chain][:, chain].tocoo()
+    inner_pattern = pattern[chain][:, chain].tocoo()
     reach, k = np.arange(len(chain)), len(chain)
-    np.maximum.at(reach, own.row, own.col)
+    np.maximum.at(reach, inner_pattern.row, inner_pattern.col)
     width = np.maximum.accumulate(reach) - np.arange(k)  # of what is between, if it ended there
-    most = max(_PIECE[0], _PIECE[1] * int(width[width > 0].min(initial=k)))
+    largest = max(_PIECE[0], _PIECE[1] * int(width[width > 0].min(initial=k)))
     pieces, start = [], 0
     while start < k:
-        window = width[start : start + most]
+        window = width[start : start + largest]
         size = len(window) - int(window[::-1].argmin())
         pieces.append(chain[start : start + size])
         start += size + int(window[size - 1])

@@ -50,7 +50,7 @@ class LaggedPressure:
     stiffness: Array | float
     surface: ElementBlock
     volumes: Array
-    places: Integers
+    slots: Integers
 
     @classmethod
     def of(
@@ -75,8 +75,8 @@ class LaggedPressure:
             coordinates[:, _EDGES].reshape(-1, 4),
             dofs[:, _EDGES].reshape(-1, 4),
         )
-        places = scatter[:, _EDGES[:, :, None], _EDGES[:, None, :]]
-        return cls(problem, solids, pressures, kappa, surface, _volumes(coordinates), places)
+        slots = scatter[:, _EDGES[:, :, None], _EDGES[:, None, :]]
+        return cls(problem, solids, pressures, kappa, surface, _volumes(coordinates), slots)
 
     def residual(self, x: Array) -> Array:
         """See `Problem`."""
@@ -108,15 +108,15 @@ class LaggedPressure:
         _, second = self.surface.tangent(x, _UNIT)
         weighted = np.repeat(excess, len(_EDGES))[:, None, None] * second
         nnz = self.problem.assembler.pattern.nnz
-        addition = np.bincount(self.places.ravel(), weighted.ravel(), nnz)
+        addition = np.bincount(self.slots.ravel(), weighted.ravel(), nnz)
         return self.problem.linearise_with(x, np.asarray(addition, dtype=np.float64))
 
-    def after(self, before: Array, x: Array) -> LaggedPressure:
-        """The problem with the pressures that a step from `before` to x asks for."""
-        first = self.surface.residual(before, _UNIT)
-        change = (first * (x - before)[self.surface.dofs]).sum(axis=1)
+    def after(self, previous: Array, x: Array) -> LaggedPressure:
+        """The problem with the pressures that a step from `previous` to x asks for."""
+        first = self.surface.residual(previous, _UNIT)
+        change = (first * (x - previous)[self.surface.dofs]).sum(axis=1)
         ratio = change.reshape(-1, len(_EDGES)).sum(axis=1) / self.volumes
-        pressures = element_pressures(self.problem, self.solids, before) + self.stiffness * ratio
+        pressures = element_pressures(self.problem, self.solids, previous) + self.stiffness * ratio
         return replace(self, pressures=pressures)
 
 

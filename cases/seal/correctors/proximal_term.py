@@ -99,6 +99,6 @@ class Anchored:
         """See `NonlinearProblem`."""
         return float(self.problem.step_limit(x, dx))
 
-    def after(self, before: Array, x: Array) -> Anchored:
+    def after(self, previous: Array, x: Array) -> Anchored:
         """See `EvolvingProblem`."""
-        return replace(self, problem=self.problem.after(before, x))
+        return replace(self, problem=self.problem.after(previous, x))

@@ -52,9 +52,9 @@ class SchurCorrector:
     linear: makes the condensations. iteration: the modified Newton iteration. stale: mean reduction
     of the residual in an outer iteration above which the condensation is outdated. A solve that is
     too slow gets up to `renewals` new ones: made at its last iterate and continued from there if
-    the residual is at most `near`, else made at the last solution and begun again. finish: exact
-    Newton steps where rounding keeps the modified iteration from the tolerance before it would
-    keep Newton's method. stalled: residual from which Newton's method goes on where new
+    the residual is at most `threshold`, else made at the last solution and begun again. finish:
+    exact Newton steps where rounding keeps the modified iteration from the tolerance before it
+    would keep Newton's method. stalled: residual from which Newton's method goes on where new
     condensations do not help, as where contact elsewhere on the body comes and goes from one
     iterate to the next.
     """
@@ -62,7 +62,7 @@ class SchurCorrector:
     linear: Condenser
     iteration: ModifiedNewton = field(default_factory=ModifiedNewton)
     stale: float = 0.35
-    near: float = 0.0
+    threshold: float = 0.0
     renewals: int = 2
     finish: Newton | None = None
     stalled: float = 0.0
@@ -102,7 +102,7 @@ class SchurCorrector:
             slow = solution.status is Status.MAX_ITERATIONS
             if not slow or self._limited_by_rounding(solution):
                 break
-            if solution.residual_norms[-1] <= self.near:
+            if solution.residual_norms[-1] <= self.threshold:
                 state = start = solution.x
             elif tangent.state is not accepted:
                 state, start = accepted, x0
@@ -114,12 +114,12 @@ class SchurCorrector:
         return solution
 
     def _attempt(
-        self, problem: LayeredProblem, state: Array | None, start: Array, before: Solution
+        self, problem: LayeredProblem, state: Array | None, start: Array, failed: Solution
     ) -> Solution:
         """The solution from `start`, with a condensation made at `state` if one is given; its cost
-        includes that of what was tried `before`.
+        includes that of what was tried `failed`.
         """
-        made, spent = before.factorisations, before.iterations
+        made, spent = failed.factorisations, failed.iterations
         if state is not None:
             try:
                 self.tangent.renew(self.linear, problem, state)

@@ -84,18 +84,18 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
         contact = DryContact.of(p, ObserverAdapter(observer))
     except StageError as failed:
         return _outcome(p, *explained(failed, p))
-    begun, linear = contact.film("out", speed), contact.newton.linear
-    if isinstance(begun, NoFilm) or not isinstance(linear, Condenser):
-        words = f"no steady film at U = {speed:g} mm/s to begin with; use a finer mesh (density)"
-        return _outcome(p, Status.MAX_ITERATIONS, words)
+    film, linear = contact.film("out", speed), contact.newton.linear
+    if isinstance(film, NoFilm) or not isinstance(linear, Condenser):
+        message = f"no steady film at U = {speed:g} mm/s to begin with; use a finer mesh (density)"
+        return _outcome(p, Status.MAX_ITERATIONS, message)
     corrector = replace(film_corrector(p, linear), stale=_STALE)
     march = March(
-        *(begun.system, motion, begun.loads, corrector, film_layer(begun.system, begun.x)),
+        *(film.system, motion, film.loads, corrector, film_layer(film.system, film.x)),
         tolerance=parameters.time_tolerance,
         integrator=BDF2() if parameters.time_order == 2 else Euler(),
         returned=parameters.supply == "returned",
     )
-    stuck = _cycles(march, begun.x, parameters.cycles, observer, log)
+    stuck = _cycles(march, film.x, parameters.cycles, observer, log)
     if stuck is not None:
         return _outcome(p, stuck.status, march.stuck)
     return _outcome(p, Status.CONVERGED, "all cycles")
@@ -103,17 +103,17 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
 
 def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) -> Branch | None:
     """All cycles; the one that did not come to its end, if there is one."""
-    before, done, last = march.initialise(x), 0, None
-    while (kept := observer.kept(float(done + 1))) is not None:
-        last, (loop, _, state, _) = kept
-        before, done = repeated(march, loop)[-1], done + 1
+    reading, done, last = march.initialise(x), 0, None
+    while (saved := observer.saved_row(float(done + 1))) is not None:
+        last, (loop, _, state, _) = saved
+        reading, done = repeated(march, loop)[-1], done + 1
         unpacked(march, state)
     for number in range(done + 1, count + 1):
         films, branch = _cycle(march, number, observer)
         if not branch.converged:
             return branch
-        last = log(number, films, before, last)
-        before = films.readings[-1]
+        last = log(number, films, reading, last)
+        reading = films.readings[-1]
     return None
 
 
@@ -127,7 +127,7 @@ def _cycle(march: March, number: int, observer: Observer) -> tuple[Films, Branch
         tables = taken_up(march, draft)
         films = Films(repeated(march, tables["loop"]), [tables["film"]], [tables["outline"]])
 
-    def told(instant: Instant, reading: Reading) -> None:
+    def record_step(instant: Instant, reading: Reading) -> None:
         nonlocal saved
         films.readings.append(reading)
         films.films.append(_film(march, instant))
@@ -144,7 +144,7 @@ def _cycle(march: March, number: int, observer: Observer) -> tuple[Films, Branch
             fraction=(reading.t_s / period) % 1.0,
         )
 
-    branch = march.until(number * period, told)
+    branch = march.until(number * period, record_step)
     films.end = packed(march)
     return films, branch
 

@@ -31,8 +31,8 @@ class Table:
         """From rows (time, value) of a key.  ValueError for times that do not rise from 0."""
         times, values = (tuple(float(v) for v in column) for column in zip(*rows, strict=True))
         if times[0] != 0.0 or len(times) < 2 or not np.all(np.diff(times) > 0.0):
-            given = ", ".join(f"{t:g}" for t in times[:4]) + ", ..." * (len(times) > 4)
-            raise ValueError(f"{key}: times {given}: at least two, rising from 0, in seconds")
+            times_text = ", ".join(f"{t:g}" for t in times[:4]) + ", ..." * (len(times) > 4)
+            raise ValueError(f"{key}: times {times_text}: at least two, rising from 0, in seconds")
         return cls(times, values)
 
     @property
@@ -91,9 +91,9 @@ class Motion:
         """Constant speeds with ramps of a share of the period each, from the middle of a way."""
         T = 1.0 / frequency
         U = stroke / (T * 0.5 * (1.0 - ramp))
-        shares = (0.0, 0.25 - ramp / 2, 0.25 + ramp / 2, 0.75 - ramp / 2, 0.75 + ramp / 2, 1.0)
+        fractions = (0.0, 0.25 - ramp / 2, 0.25 + ramp / 2, 0.75 - ramp / 2, 0.75 + ramp / 2, 1.0)
         values = (U, U, -U, -U, U, U)
-        return cls(Table(tuple(T * s for s in shares), values), _repeated(pressure, T))
+        return cls(Table(tuple(T * s for s in fractions), values), _repeated(pressure, T))
 
     @classmethod
     def of(cls, rows: Rows, pressure: Rows | float) -> Motion:
@@ -111,31 +111,31 @@ class Motion:
 
         One per cent of its way and of its largest speed is no defect: so well measured ones close.
         """
-        values, words = self.speed.values, []
+        values, messages = self.speed.values, []
         if self.drift:
             on = f"{self.drift:+.3g} mm farther in each cycle"
-            words.append(f"motion: the rod does not come back: {on}")
+            messages.append(f"motion: the rod does not come back: {on}")
         if abs(values[0] - values[-1]) > 0.01 * self.speed.largest:
-            words.append(
+            messages.append(
                 f"motion: the speed jumps from {values[-1]:g} to {values[0]:g} mm/s where it "
                 "repeats; end it with the speed that it begins with"
             )
-        return words
+        return messages
 
     @property
     def drift(self) -> float:
         """Way by which a cycle moves the rod on, mm; 0 within one per cent of all its way."""
-        on = self.place(self.period)
-        way = float(np.trapezoid(np.abs(self.speed.values), self.speed.times))
-        return on if abs(on) > 0.01 * way else 0.0
+        on = self.position(self.period)
+        distance = float(np.trapezoid(np.abs(self.speed.values), self.speed.times))
+        return on if abs(on) > 0.01 * distance else 0.0
 
-    def place(self, t: float) -> float:
+    def position(self, t: float) -> float:
         """Way of the rod since t = 0, mm."""
-        cycles, rest = divmod(t, self.period)
-        return float(cycles * self._way(self.period) + self._way(rest))
+        cycles, remainder = divmod(t, self.period)
+        return float(cycles * self._position(self.period) + self._position(remainder))
 
     @cached_property
-    def _way(self) -> BSpline:
+    def _position(self) -> BSpline:
         return make_interp_spline(self.speed.times, self.speed.values, k=1).antiderivative()
 
 
@@ -143,45 +143,48 @@ class Motion:
 class RodFilm:
     """Film that an outstroke leaves on the rod, for the instroke that brings it back.
 
-    places: of the rod, mm, where it passed the air side; films: thickness there, as h* of (16), mm.
+    positions: of the rod, mm, where it passed the air side; films: thickness there, as h* of (16),
+    mm.
     """
 
-    places: list[float]
+    positions: list[float]
     films: list[float]
 
-    def leave(self, place: float, film: float) -> None:
+    def leave(self, position: float, film: float) -> None:
         """A film at a new place; what was there before is forgotten."""
-        while self.places and self.places[-1] >= place:
-            self.places.pop()
+        while self.positions and self.positions[-1] >= position:
+            self.positions.pop()
             self.films.pop()
-        self.places.append(place)
+        self.positions.append(position)
         self.films.append(max(film, 0.0))
 
-    def found(self, place: float) -> float | None:
+    def thickness_at(self, position: float) -> float | None:
         """The film at a place, None where nothing was left: the rod is new there."""
-        if not self.places or not self.places[0] <= place <= self.places[-1]:
+        if not self.positions or not self.positions[0] <= position <= self.positions[-1]:
             return None
-        return float(np.interp(place, self.places, self.films))
+        return float(np.interp(position, self.positions, self.films))
 
 
-def motion_keys(given: dict[str, Any]) -> dict[str, Any]:
+def motion_keys(values: dict[str, Any]) -> dict[str, Any]:
     """Keys in which `motion` is a list or left out: words and files are read.  ValueError."""
-    motion = given.get("motion")
+    motion = values.get("motion")
     if isinstance(motion, dict):
-        known = {"stroke": "travel", "frequency": "frequency", "shape": "shape", "ramp": "ramp"}
-        wrong = [name for name in motion if name not in known]
-        if wrong:
-            raise ValueError(f"motion: {wrong[0]!r} is not known; there are {', '.join(known)}")
-        words = {known[name]: value for name, value in motion.items()}
-        return {**{k: v for k, v in given.items() if k != "motion"}, **words}
+        key_names = {"stroke": "travel", "frequency": "frequency", "shape": "shape", "ramp": "ramp"}
+        unknown = [name for name in motion if name not in key_names]
+        if unknown:
+            raise ValueError(
+                f"motion: {unknown[0]!r} is not known; there are {', '.join(key_names)}"
+            )
+        renamed = {key_names[name]: value for name, value in motion.items()}
+        return {**{k: v for k, v in values.items() if k != "motion"}, **renamed}
     if isinstance(motion, str):
         try:
             table = read_table(Path(motion))
             rows = list(zip(table["t_s"].tolist(), table["U_mm_s"].tolist(), strict=True))
         except (OSError, KeyError, ValueError) as error:
             raise ValueError(f"motion = {motion!r}: no CSV with t_s, U_mm_s ({error})") from None
-        return {**given, "motion": rows}
-    return given
+        return {**values, "motion": rows}
+    return values
 
 
 def missing(supply: float, outer: float, inner: float, order: int) -> float:

@@ -42,7 +42,7 @@ from softehl.runtime.solve.solution import Branch, Status
 class Instant:
     """A film at a time: unknowns x (n,), content of its segments (segments, m_p + 1), mm^2.
 
-    held: in all of them. fluxes: (2,) at the sealed and the air end, + to the air side, mm^2/s.
+    volume: in all of them. fluxes: (2,) at the sealed and the air end, + to the air side, mm^2/s.
     volumes: (2,) what has passed these ends, mm^2: by the same differences in time as the content,
     so that both balance to rounding.
     """
@@ -50,7 +50,7 @@ class Instant:
     t: float
     x: Array
     content: Array
-    held: float
+    volume: float
     fluxes: Array
     volumes: Array
 
@@ -87,7 +87,7 @@ class _Step(StepAttempt):
 
 @dataclass(eq=False)
 class March(Stepper):
-    """A march in time; `behind` holds the last instants, newest first, and changes with steps.
+    """A march in time; `history` holds the last instants, newest first, and changes with steps.
 
     film: loads that do not change. tolerance: error of the film thickness, relative to it, that a
     step aims at. integrator: backward Euler or BDF2. returned: whether the instroke finds what
@@ -104,11 +104,11 @@ class March(Stepper):
     integrator: FirstOrderIntegrator
     returned: bool
     rod: RodFilm = field(default_factory=lambda: RodFilm([], []))
-    behind: list[Instant] = field(default_factory=list)
+    history: list[Instant] = field(default_factory=list)
     dt: float = 0.0
     condensed_at: float = 0.0
     goal: float = 0.0
-    told: Callable[[Instant, Reading], None] = lambda instant, reading: None
+    on_step: Callable[[Instant, Reading], None] = lambda instant, reading: None
 
     def initialise(self, x: Array) -> Reading:
         """From the steady film x (n,) at t = 0; its reading."""
@@ -116,12 +116,12 @@ class March(Stepper):
         film = self._loads(0.0)
         problem = self.system.film_problem(film)
         first = Instant(0.0, x, *self._content(x), self._fluxes(problem, x), np.zeros(2))
-        self.behind = [first]
+        self.history = [first]
         return self._reading(problem, film, first, 0)
 
     def until(self, goal: float, on_step: Callable[[Instant, Reading], None]) -> Branch:
         """March to a time; every step is told."""
-        self.goal, self.told = goal, on_step
+        self.goal, self.on_step = goal, on_step
         smallest = 1e-8 * self.motion.period
         return follow_path(self, StepRule(max(self.dt, smallest), smallest), PathLog("t"))
 
@@ -146,7 +146,7 @@ class March(Stepper):
 
     def start(self) -> StepAttempt:
         """See `Stepper`."""
-        return StepAttempt.solved(self.behind[0].t, self.behind[0].x, self.dt)
+        return StepAttempt.solved(self.history[0].t, self.history[0].x, self.dt)
 
     def attempt(self, step: float) -> StepAttempt:
         """Solve for the film a step later, or where the speed has a corner, or at the goal.
@@ -155,11 +155,11 @@ class March(Stepper):
         One with an error of three tolerances is refused, as behind a corner; to refuse errors above
         one costs a tenth more steps.
         """
-        now = self.behind[0].t
+        now = self.history[0].t
         corner = self.motion.speed.next_corner(now) if self.motion.corners else self.goal
         longest = min(step, 0.02 * self.motion.period)
         t = next_parameter(now, min(corner, self.goal), longest)
-        guess = polynomial_value([i.t for i in self.behind], [i.x for i in self.behind], t)
+        guess = polynomial_value([i.t for i in self.history], [i.x for i in self.history], t)
         dt, film = t - now, self._loads(t)
         problem, layer = self._problem(film, dt)
         tangent = self.corrector.tangent.state
@@ -170,11 +170,11 @@ class March(Stepper):
         if not solution.converged:
             return StepAttempt(t, solution, dt)
         error = self._error(solution.x, guess)
-        power = 1.0 / 3.0 if len(self.behind) > 1 else 0.5
+        power = 1.0 / 3.0 if len(self.history) > 1 else 0.5
         following = 0.8 * dt / max(error**power, 0.45)
         if error > 3.0:
-            words = f"its error is {error:.2g} tolerances"
-            solution = replace(solution, status=Status.REFUSED, message=words)
+            message = f"its error is {error:.2g} tolerances"
+            solution = replace(solution, status=Status.REFUSED, message=message)
         return _Step(t, solution, dt, next_step=following, problem=problem, film=film)
 
     def accept(self, attempt: StepAttempt) -> None:
@@ -183,25 +183,25 @@ class March(Stepper):
             return  # the start
         instant = self._instant(attempt.problem, attempt.solution.x, attempt.step_length)
         reading = self._reading(attempt.problem, attempt.film, instant, attempt.solution.iterations)
-        self.behind, self.dt = [instant, *self.behind[:2]], attempt.next_step
+        self.history, self.dt = [instant, *self.history[:2]], attempt.next_step
         self.deposit(reading)
-        self.told(instant, reading)
+        self.on_step(instant, reading)
 
     def end(self) -> End | None:
         """See `Stepper`."""
-        now = self.behind[0].t
+        now = self.history[0].t
         going = now < self.goal * (1.0 - 1e-12)
         return None if going else (Status.CONVERGED, f"reached t = {now:.9g}")
 
     @property
     def stuck(self) -> str:
         """From when on there is no step, and what may help."""
-        now = self.behind[0]
-        least = 1e3 * float(self.system.arc_film(now.x)[1].min())
+        now = self.history[0]
+        thinnest = 1e3 * float(self.system.arc_film(now.x)[1].min())
         advice = "try time_order = 1, a smaller time_tolerance, roughness or a finer mesh (density)"
-        if not self.system.parameters.rough and least < 0.05:
+        if not self.system.parameters.rough and thinnest < 0.05:
             advice = (
-                f"the film is {least:.2g} um thin there, where real surfaces touch; give a "
+                f"the film is {thinnest:.2g} um thin there, where real surfaces touch; give a "
                 "roughness (0.2 to 0.4 um is usual), or time_order = 1"
             )
         speed = self.motion.speed.at(now.t)
@@ -216,10 +216,12 @@ class March(Stepper):
             sealed_pressure=p_s,
             slip=0.01 * self.motion.speed.largest,
         )
-        supply = self.rod.found(self.motion.place(t)) if self.returned and U < 0.0 else None
+        supply = (
+            self.rod.thickness_at(self.motion.position(t)) if self.returned and U < 0.0 else None
+        )
         if supply is None:
             return film
-        _, h = self.system.arc_film(self.behind[0].x)
+        _, h = self.system.arc_film(self.history[0].x)
         order = self.system.parameters.pressure_order
         return replace(film, inflow=(0.0, missing(supply, float(h[-1]), float(h[-2]), order)))
 
@@ -242,14 +244,14 @@ class March(Stepper):
 
     def _differences(self, dt: float) -> tuple[float, list[tuple[float, Instant]]]:
         """Weights of d/dt at the end of a step: its own, those of the instants before."""
-        last = self.behind[: self.integrator.order]
+        last = self.history[: self.integrator.order]
         steps = [dt, *(newer.t - older.t for newer, older in pairwise(last))]
         rate, *weights = self.integrator.weights(steps).tolist()
-        return rate, list(zip(weights, self.behind, strict=False))
+        return rate, list(zip(weights, self.history, strict=False))
 
     def _error(self, x: Array, guess: Array) -> float:
         """Prediction and result differ by so many tolerances in the film thickness."""
-        if len(self.behind) < 2:
+        if len(self.history) < 2:
             return 1.0
         (_, h), (_, foreseen) = self.system.arc_film(x), self.system.arc_film(guess)
         size = np.abs(h) + self.system.parameters.surfaces.sigma
@@ -258,7 +260,7 @@ class March(Stepper):
     def _instant(self, problem: Problem, x: Array, dt: float) -> Instant:
         (rate, past), fluxes = self._differences(dt), self._fluxes(problem, x)
         volumes = (fluxes - sum(w * i.volumes for w, i in past)) / rate
-        return Instant(self.behind[0].t + dt, x, *self._content(x), fluxes, volumes)
+        return Instant(self.history[0].t + dt, x, *self._content(x), fluxes, volumes)
 
     def _fluxes(self, problem: Problem, x: Array) -> Array:
         """See Instant; what the equations of the prescribed end pressures lack."""
@@ -280,7 +282,7 @@ class March(Stepper):
         rough = rough_numbers(system, at)
         return Reading(
             t_s=instant.t,
-            place_mm=self.motion.place(instant.t),
+            place_mm=self.motion.position(instant.t),
             rod_speed_mm_s=film.rod_speed,
             sealed_pressure_MPa=film.sealed_pressure,
             friction_N=float(system.around * (at["tau_rod"] * at["dx"]).sum()),
@@ -288,7 +290,7 @@ class March(Stepper):
             flux_air_mm2_s=float(instant.fluxes[1]),
             volume_sealed_mm2=float(instant.volumes[0]),
             volume_air_mm2=float(instant.volumes[1]),
-            content_mm2=instant.held,
+            content_mm2=instant.volume,
             h_min_um=1e3 * float(system.arc_film(x)[1].min()),
             p_max_MPa=float(at["p"].max()),
             asperity_load_percent=100.0 * rough.get("asperity_load", 0.0),
@@ -311,25 +313,27 @@ def packed(march: March) -> dict[str, Array]:
     the segments and the unknowns, (n,) in all.
     """
     columns = {
-        f"instant_{k}": np.concatenate([[i.t, i.held], i.fluxes, i.volumes, i.content.ravel(), i.x])
-        for k, i in enumerate(march.behind)
+        f"instant_{k}": np.concatenate(
+            [[i.t, i.volume], i.fluxes, i.volumes, i.content.ravel(), i.x]
+        )
+        for k, i in enumerate(march.history)
     }
     return {**columns, STEP: np.full(len(columns["instant_0"]), march.dt)}
 
 
 def unpacked(march: March, table: Mapping[str, Array]) -> None:
     """Put a march where `packed` took it; it has begun.  ValueError for another mesh."""
-    content = march.behind[0].content
-    length = 6 + content.size + len(march.behind[0].x)
+    content = march.history[0].content
+    length = 6 + content.size + len(march.history[0].x)
     if len(table[STEP]) != length:
         raise ValueError(f"a state of {len(table[STEP])} numbers does not fit {length}")
-    ends = 2, 4, 6, 6 + content.size
-    behind = []
+    bounds = 2, 4, 6, 6 + content.size
+    history = []
     for name in sorted(name for name in table if name != STEP):
-        (t, held), fluxes, volumes, filled, x = np.split(table[name], ends)
+        (t, volume), fluxes, volumes, filled, x = np.split(table[name], bounds)
         filled = filled.reshape(content.shape)
-        behind.append(Instant(float(t), x, filled, float(held), fluxes, volumes))
-    march.behind, march.dt = behind, float(table[STEP][0])
+        history.append(Instant(float(t), x, filled, float(volume), fluxes, volumes))
+    march.history, march.dt = history, float(table[STEP][0])
 
 
 def repeated(march: March, loop: Mapping[str, Array]) -> list[Reading]:
@@ -348,8 +352,8 @@ def drafted(march: March, cycle: Tables) -> dict[str, Array]:
     assert tangent.state is not None
     assert tangent.accepted is not None
     numbers = np.array([march.condensed_at, float(tangent.outdated)])
-    held = {"state": tangent.state, "accepted": tangent.accepted, "numbers": numbers}
-    tables: Tables = {**cycle, "march": packed(march), "tangent": held}
+    tangent_table = {"state": tangent.state, "accepted": tangent.accepted, "numbers": numbers}
+    tables: Tables = {**cycle, "march": packed(march), "tangent": tangent_table}
     return {f"{t}/{name}": column for t, table in tables.items() for name, column in table.items()}
 
 
@@ -357,8 +361,8 @@ def taken_up(march: March, arrays: Mapping[str, Array]) -> Tables:
     """Put a march where `drafted` took it; the tables of the cycle so far."""
     tables: dict[str, dict[str, Array]] = {}
     for name, column in arrays.items():
-        table, _, own = name.partition("/")
-        tables.setdefault(table, {})[own] = column
+        table, _, column_name = name.partition("/")
+        tables.setdefault(table, {})[column_name] = column
     unpacked(march, tables["march"])
     tangent = tables["tangent"]
     t, outdated = tangent["numbers"].tolist()

@@ -188,9 +188,9 @@ BLOCKS = (
 def blocks_of(p: Seal) -> tuple[Block, ...]:
     """The blocks of a case, first the solids of its section in the order of their elements."""
     solid, *others = BLOCKS
-    own = [replace(solid, name=f"{SOLID} {r}", elements=r, region=r) for r in p.materials]
+    region_blocks = [replace(solid, name=f"{SOLID} {r}", elements=r, region=r) for r in p.materials]
     body = (solid,) if p.has_body else ()
-    return (*own, *body, *(block for block in others if block.needed(p)))
+    return (*region_blocks, *body, *(block for block in others if block.needed(p)))
 
 
 def obstacles_of(p: Gland) -> dict[str, Obstacle]:
@@ -234,7 +234,7 @@ def contact_values(loads: ContactLoads) -> dict[str, Values | None]:
         "sealed_side": pressure,
         "sealed_arc": pressure,
         **{name: {"offset": offset} for name, offset in loads.offsets.items()},
-        "hold": {"place": loads.place or 0.0},
+        "hold": {"place": loads.position or 0.0},
     }
 
 

@@ -169,7 +169,7 @@ class SealUnknowns:
     @property
     def film_ends(self) -> Integers:
         """Pressure unknowns at the sealed and the air end of the film, (15), for "fe" and "dg"."""
-        return self._ends(PRESSURE)
+        return self._end_dofs(PRESSURE)
 
     def contact_fields(self) -> tuple[Field, ...]:
         """The fields that contact knows: film pressures are all zero in it."""
@@ -183,7 +183,7 @@ class SealUnknowns:
     def _fields(self) -> tuple[Field, ...]:
         return tuple(field for field in FIELDS if field.name in self.layout.names)
 
-    def _ends(self, field: str) -> Integers:
+    def _end_dofs(self, field: str) -> Integers:
         return self.layout.dofs(field)[[0, -1]]
 
 
@@ -202,29 +202,31 @@ def seal_study(p: Seal, section: SealSection, blocks: Sequence[Block]) -> Study:
 
     Raises KeyError for a kernel that asks for a value that nobody gives.
     """
-    places = _film_places(p, section)
-    still = film_values(p, FilmLoads(0.0, "out", 0.0, np.empty(0)))
+    positions = _film_places(p, section)
+    at_rest = film_values(p, FilmLoads(0.0, "out", 0.0, np.empty(0)))
     elements = {
         **section.elements,
-        "film_nodes": np.empty((len(places["film_nodes"]), 0), np.int64),
+        "film_nodes": np.empty((len(positions["film_nodes"]), 0), np.int64),
     }
     study = Study(Mesh(section.mesh.points, {"quad4": section.mesh.quads}), "axisymmetric")
     for block in blocks:
         kernel = load_kernel(block.kernel_of(p))
-        own = [name for name, node in kernel.places if node is None]
-        values = chosen(block, kernel, values_at_rest(block, p, section) or still)
+        field_names = [name for name, node in kernel.places if node is None]
+        values = kernel_values(block, kernel, values_at_rest(block, p, section) or at_rest)
         by_steps = {"rate"} if any("_rate" in name for name in kernel.data) else set()
-        given: dict[str, Any] = {n: v for n, v in values.items() if n not in by_steps}
+        arguments: dict[str, Any] = {n: v for n, v in values.items() if n not in by_steps}
         study.add(
             block.name,
             kernel,
             on=elements[block.elements],
-            shared=[u for u, f in zip(own, block.fields, strict=False) if _ON[f] == "section"],
-            called=dict(zip(own, block.fields, strict=False)),
-            along={f: places[block.elements] for f in block.fields if _ON[f] == "film"},
+            shared=[
+                u for u, f in zip(field_names, block.fields, strict=False) if _ON[f] == "section"
+            ],
+            called=dict(zip(field_names, block.fields, strict=False)),
+            along={f: positions[block.elements] for f in block.fields if _ON[f] == "film"},
             rule=block.rule(p) if block.rule else None,
             constant=block.constant,
-            **given | _contact_constants(p, section, block, kernel.data),
+            **arguments | _contact_constants(p, section, block, kernel.data),
         )
     return study
 
@@ -249,11 +251,11 @@ def _contact_constants(
     chain = section.chains[block.elements]
     stiffness, obstacle = section.node_moduli(p)[chain[0]], obstacles_of(p)[block.name]
     values = contact_data(obstacle, section.mesh.points, *chain, stiffness)
-    known = dict(zip(("n_z", "n_r", "c", "area", "rho"), values.T, strict=True))
-    return {name: value for name, value in known.items() if name in names}
+    constants = dict(zip(("n_z", "n_r", "c", "area", "rho"), values.T, strict=True))
+    return {name: value for name, value in constants.items() if name in names}
 
 
-def chosen(block: Block, kernel: ElementKernel, values: Values) -> Values:
+def kernel_values(block: Block, kernel: ElementKernel, values: Values) -> Values:
     """Values that the kernel of a block asks for.  Raises KeyError for one that is not there."""
     missing = [name for name in kernel.parameters if name not in values]
     if missing:
@@ -281,17 +283,19 @@ class SealSystem(SealUnknowns):
     def of(cls, p: Seal, section: SealSection) -> SealSystem:
         """The system of a case on a section."""
         present = blocks_of(p)
-        posed = seal_study(p, section, present).system(NUMBERED)
-        numbering = posed.numbering
+        built = seal_study(p, section, present).system(NUMBERED)
+        numbering = built.numbering
         cells = section.coordinates("cells"), numbering.at(MOVED, section.mesh.quads)
-        still = replace(
-            posed.resting(),
+        at_rest = replace(
+            built.resting(),
             scales={f.name: f.scale(p) for f in FIELDS if f.name in numbering.layout.names},
             absolute=True,
             guards=(KeepsOrientation(*cells),),
         )
-        off = {block.name: None for block in present if block.of_film}
-        system = cls(p, section, numbering, present, obstacles_of(p), still.with_parameters(**off))
+        switched_off = {block.name: None for block in present if block.of_film}
+        system = cls(
+            p, section, numbering, present, obstacles_of(p), at_rest.with_parameters(**switched_off)
+        )
         films = [system.layout.dofs(field.name) for field in system.film_fields()]
         return replace(system, problem=system.problem.with_fixed(films, [0.0] * len(films)))
 
@@ -335,23 +339,23 @@ class SealSystem(SealUnknowns):
         problem = self.problem.with_parameters(**contact_values(loads))
         if loads.moment is not None:
             problem = problem.also_fixed(self.layout.dofs(ROTATION), loads.moment)
-        if loads.place is not None:
+        if loads.position is not None:
             return problem
         return problem.also_fixed(self.layout.dofs(AXIAL), -self.side * loads.axial_force)
 
     def film_problem(self, film: FilmLoads) -> Problem:
         """Film forces (18) and the Reynolds equation (25); the contact with the rod is without."""
-        contact = self.contact_problem(ContactLoads(film.sealed_pressure, place=film.place))
+        contact = self.contact_problem(ContactLoads(film.sealed_pressure, position=film.position))
         problem = contact.with_parameters(
             **{ROD: None, "sealed_arc": {"pressure": 0.0}},  # the film bears the arc
-            **self._given("film", film_values(self.parameters, film)),
+            **self._group_values("film", film_values(self.parameters, film)),
         )
         fixed = [self.film_ends, self.layout.dofs(ROD)]
-        values: list[Array | float] = [film.ends, 0.0]
+        values: list[Array | float] = [film.end_pressures, 0.0]
         if self.parameters.conserving:
-            fixed.append(self._ends(VOID))
+            fixed.append(self._end_dofs(VOID))
             values.append(np.array(film.inflow))
-        if film.place is None:
+        if film.position is None:
             fixed.append(self.layout.dofs(AXIAL))
             values.append(0.0)
         if film.moment is not None:
@@ -367,7 +371,7 @@ class SealSystem(SealUnknowns):
     def squeeze_values(self, rate: float) -> dict[str, Values]:
         """Parameters of the block of what the film holds; rate: coefficient of d/dt, 1/s."""
         values = {"rod_radius": self.rod_radius, "rate": rate, **self.parameters.surfaces.values()}
-        return self._given("squeeze", values)
+        return self._group_values("squeeze", values)
 
     def film_guard(self) -> Guard:
         """Film thickness at the nodes of the arc: positive in every iterate between smooth
@@ -394,10 +398,12 @@ class SealSystem(SealUnknowns):
         )
         return scales.film_flux(speed) + largest
 
-    def _given(self, group: Group, values: Values) -> dict[str, Values]:
+    def _group_values(self, group: Group, values: Values) -> dict[str, Values]:
         """Values that the blocks of a group ask for, by block."""
         return {
-            block.name: chosen(block, self.problem.assembler.block(block.name).kernel, values)
+            block.name: kernel_values(
+                block, self.problem.assembler.block(block.name).kernel, values
+            )
             for block in self.blocks
             if block.group == group
         }

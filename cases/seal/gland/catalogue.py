@@ -40,12 +40,12 @@ def ring(name: str) -> Ring:
     A metric ring has the tolerances of ISO 3601-1, class B, for general use. Raises
     NotUnderstoodError, which names the nearest rings.
     """
-    said = read_ring(name)
-    if said.outer is not None:
+    ring_name = read_ring(name)
+    if ring_name.outer is not None:
         raise refused("ring", name, "is a U-cup, which is named by its groove")
-    if said.number is not None:
-        return _by_number(name.strip(), said.number)
-    return _metric(name.strip(), said.inner, said.section)
+    if ring_name.number is not None:
+        return _by_number(name.strip(), ring_name.number)
+    return _metric(name.strip(), ring_name.inner, ring_name.section)
 
 
 @cache
@@ -68,7 +68,7 @@ def _metric(name: str, inner: float, section: float) -> Ring:
         )
     steps = {2.25: 0.08, 3.15: 0.09, 4.50: 0.10, 6.30: 0.13, 8.40: 0.15}
     tolerance = round(0.009 * inner**0.95 + 0.11, 2)
-    of_section = next((steps[most] for most in steps if section <= most), None)
+    of_section = next((steps[limit] for limit in steps if section <= limit), None)
     return Ring(f"ISO 3601 {inner:g}x{section:g}", inner, section, tolerance, of_section)
 
 
@@ -77,8 +77,8 @@ def _by_number(text: str, number: int) -> Ring:
     if number in rings:
         return rings[number]
     below, above = [n for n in rings if n < number][-1:], [n for n in rings if n > number][:1]
-    near = " and ".join(f'"{rings[n].name}"' for n in (*below, *above))
+    neighbours = " and ".join(f'"{rings[n].name}"' for n in (*below, *above))
     raise NotUnderstoodError(
-        f'ring = "{text}": AS568 has no general size -{number:03d}; nearest: {near} '
+        f'ring = "{text}": AS568 has no general size -{number:03d}; nearest: {neighbours} '
         "(-001 to -050, -102 to -178, -201 to -284, -309 to -395, -425 to -475)"
     )

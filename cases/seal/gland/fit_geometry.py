@@ -13,7 +13,7 @@ from typing import Any
 
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.grooves import KINDS, Groove, cup_gland, gland
-from softehl.cases.seal.gland.key_values import agree, number, put, shown
+from softehl.cases.seal.gland.key_values import agree, number, put, value_text
 from softehl.cases.seal.gland.records import OF_PISTON, FreeSeal, Gland
 from softehl.cases.seal.gland.sections.section_keys import section_of_file
 from softehl.cases.seal.gland.sections.shapes import UCup, parts_of
@@ -96,23 +96,24 @@ def _in_piston(values: dict[str, Any]) -> None:
 
 
 def _with_ring(values: dict[str, Any]) -> None:
-    said = read_ring(values["ring"])
-    if said.kind not in (None, "round"):
-        section = values.setdefault("section", said.kind)
-        if section != said.kind:
+    ring_name = read_ring(values["ring"])
+    if ring_name.kind not in (None, "round"):
+        section = values.setdefault("section", ring_name.kind)
+        if section != ring_name.kind:
             raise ValueError(
                 f'section = "{section}" and ring = "{values["ring"]}" contradict: leave one out'
             )
-    if said.outer is not None:
-        ends = said.inner, said.outer
-        rod, ground = ends if _side(values) > 0.0 else (-ends[1], -ends[0])
-        if said.bore_first and rod > 0.0:
+    if ring_name.outer is not None:
+        diameters = ring_name.inner, ring_name.outer
+        rod, ground = diameters if _side(values) > 0.0 else (-diameters[1], -diameters[0])
+        if ring_name.bore_first and rod > 0.0:
             raise ValueError(
                 f'ring = "{values["ring"]}" names a piston seal, its bore first; give '
-                f'bore = {said.outer:g}, or write "U-cup {said.inner:g}x{said.outer:g}x'
-                f'{said.width:g}" for a rod seal'
+                f'bore = {ring_name.outer:g}, or write "U-cup '
+                f"{ring_name.inner:g}x{ring_name.outer:g}x"
+                f'{ring_name.width:g}" for a rod seal'
             )
-        _with_cup(values, rod, ground, said.width or 0.0)
+        _with_cup(values, rod, ground, ring_name.width or 0.0)
         return
     ring = catalogue.ring(values["ring"])
     if values.get("rod_diameter") is None:
@@ -121,8 +122,8 @@ def _with_ring(values: dict[str, Any]) -> None:
             f'ring = "{values["ring"]}" needs the rod that it seals, as in rod = {rod:g}, '
             f"or the bore of a piston seal, as in bore = {bore:g}"
         )
-    before, inner = values.get("inner_diameter"), ring.inner_diameter
-    if _side(values) < 0.0 and not (number(before) and before > 0.0):
+    previous, inner = values.get("inner_diameter"), ring.inner_diameter
+    if _side(values) < 0.0 and not (number(previous) and previous > 0.0):
         inner = -ring.outer_diameter
     _follow(values, "inner_diameter", inner, "ring")
     _follow(values, "section_diameter", ring.section_diameter, "ring")
@@ -154,19 +155,19 @@ def _with_cup(values: dict[str, Any], rod: float, groove: float, width: float) -
 
 def _require_rod_of_cup(values: Mapping[str, Any], rod: float, groove: float, width: float) -> None:
     """ValueError for a U-cup that is named by another rod, or bore, than the one that is given."""
-    given, ground = values["rod_diameter"], values["housing_diameter"]
+    diameter, ground = values["rod_diameter"], values["housing_diameter"]
     section = values["section_diameter"]
-    if not (number(given) and number(ground)) or 0.98 <= given / rod <= 1.02:
+    if not (number(diameter) and number(ground)) or 0.98 <= diameter / rod <= 1.02:
         return
-    if 0.5 * section < 0.5 * (ground - given) < section and -0.1 <= given / rod - 1.0 <= 0.2:
+    if 0.5 * section < 0.5 * (ground - diameter) < section and -0.1 <= diameter / rod - 1.0 <= 0.2:
         return
-    what, size, depth = "rod" if rod > 0.0 else "bore", abs(given), round(groove - rod, 4)
-    near = round(size)
-    ends = (near, near + depth) if rod > 0.0 else (near - depth, near)
+    what, size, depth = "rod" if rod > 0.0 else "bore", abs(diameter), round(groove - rod, 4)
+    rounded = round(size)
+    diameters = (rounded, rounded + depth) if rod > 0.0 else (rounded - depth, rounded)
     raise ValueError(
         f'ring = "{values["ring"]}" is a U-cup for a {what} of {abs(rod):g} mm, not of '
-        f"{shown(float(size))}; give {what} = {abs(rod):g}, or a U-cup for this {what}, as in "
-        f'"U-cup {ends[0]:g}x{ends[1]:g}x{width:g}"'
+        f"{value_text(float(size))}; give {what} = {abs(rod):g}, or a U-cup for this {what}, as in "
+        f'"U-cup {diameters[0]:g}x{diameters[1]:g}x{width:g}"'
     )
 
 
@@ -183,8 +184,8 @@ def _with_gland(values: dict[str, Any]) -> None:
     if values.get("gland") in KINDS:
         groove = _groove(values, section)
         if values.get("housing_diameter") is None:
-            said = texts(values.get("said"))
-            limits = {name: found for name, _, found in bands(said, piston=rod < 0.0)}
+            terms = texts(values.get("said"))
+            limits = {name: limit for name, _, limit in bands(terms, piston=rod < 0.0)}
             named = limits.get("bore" if rod < 0.0 else "rod")
             of_chart = math.copysign(named.nominal, rod) if named else rod
             values["housing_diameter"] = round(of_chart + 2.0 * groove.depth, 4)
@@ -210,14 +211,14 @@ def _follow(values: dict[str, Any], key: str, value: float, source: str) -> None
     """A length that follows from another key, set or seen to agree.  ValueError names both."""
     if values.get(key) is None:
         values[key] = value
-    before, latter = values[key], f"{source} = {values[source]}"
-    if not number(before) or agree(before, value):
+    previous, latter = values[key], f"{source} = {values[source]}"
+    if not number(previous) or agree(previous, value):
         return  # what is no number is refused with its key
     earlier = _GROUND[: _GROUND.index(source)] if source in _GROUND else ()
     former = next((name for name in earlier if number(values.get(name))), None)
-    was, new = shown(abs(before)), shown(abs(value))
-    words = f"{key} = {was} and {latter} contradict: the latter gives {new}"
+    was, new = value_text(abs(previous)), value_text(abs(value))
+    message = f"{key} = {was} and {latter} contradict: the latter gives {new}"
     if former:
-        given = f"{former} = {shown(values[former])}"
-        words = f"{given} and {latter} contradict: they give diameters of {was} and {new}"
-    raise ValueError(f"{words} mm; leave one of them out")
+        setting = f"{former} = {value_text(values[former])}"
+        message = f"{setting} and {latter} contradict: they give diameters of {was} and {new}"
+    raise ValueError(f"{message} mm; leave one of them out")

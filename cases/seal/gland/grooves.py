@@ -52,20 +52,20 @@ def gland(section_diameter: float, kind: Kind = "dynamic", section: str = "round
     """The gland for a section (mm) of this shape; a U-cup has `cup_gland`.  ValueError."""
     round_rings = "pneumatic" if kind == "pneumatic" else "dynamic"
     chart = _chart("x_ring" if section == "x_ring" else round_rings)
-    near = min(chart, key=lambda g: abs(g.section_diameter - section_diameter))
+    nearest = min(chart, key=lambda g: abs(g.section_diameter - section_diameter))
     # ISO 3601 and AS568 have the same grooves for sections to 1.2 % apart, 2.65 and 2.62 mm
-    if abs(section_diameter - near.section_diameter) <= 0.03 * near.section_diameter:
-        return near
+    if abs(section_diameter - nearest.section_diameter) <= 0.03 * nearest.section_diameter:
+        return nearest
     for below, above in pairwise(chart):
         if below.section_diameter < section_diameter < above.section_diameter:
             return _between(below, above, section_diameter)
-    scale = section_diameter / near.section_diameter
+    scale = section_diameter / nearest.section_diameter
     raise ValueError(
         f'gland = "{kind}" has no groove for a section of {section_diameter:g} mm (only '
         f"{chart[0].section_diameter:.3g} to {chart[-1].section_diameter:.3g} mm); give squeeze "
         "and groove_width instead: in the proportions of the nearest one, squeeze = "
-        f"{squeeze(near.section_diameter, near.depth):.3g} and groove_width = "
-        f"{scale * near.width:.3g}"
+        f"{squeeze(nearest.section_diameter, nearest.depth):.3g} and groove_width = "
+        f"{scale * nearest.width:.3g}"
     )
 
 
@@ -101,5 +101,5 @@ def _chart(name: str) -> tuple[Groove, ...]:
 def _groove(row: dict[str, str]) -> Groove:
     unit = INCH if row["unit"] == "in" else 1.0
     names = ("section", "depth_low", "depth_high", "width_low", "width_high")
-    section, *ends = (round(unit * float(row[name]), 4) for name in names)
-    return Groove(section, 0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3]))
+    section, *limits = (round(unit * float(row[name]), 4) for name in names)
+    return Groove(section, 0.5 * (limits[0] + limits[1]), 0.5 * (limits[2] + limits[3]))

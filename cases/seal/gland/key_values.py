@@ -24,27 +24,28 @@ def put(values: dict[str, Any], key: str, value: Any, source: str, within: float
     source: what it follows from, in words. within: as in `agree`. Raises ValueError for a
     contradiction.
     """
-    before = values.get(key)
-    if before is None:
+    previous = values.get(key)
+    if previous is None:
         values[key] = value
-    elif not agree(before, value, within):
+    elif not agree(previous, value, within):
         raise ValueError(
-            f"{key} = {shown(before)} and {source} contradict: the latter gives {shown(value)}; "
-            "leave one of them out"
+            f"{key} = {value_text(previous)} and {source} contradict: the latter gives "
+            f"{value_text(value)}; leave one of them out"
         )
 
 
-def agree(before: object, value: object, within: float = 1e-6) -> bool:
+def agree(existing: object, value: object, within: float = 1e-6) -> bool:
     """True if what was given, a number or several, is what follows, or has yet to be refused.
 
     A value of another type is refused with its key. within: relative difference that agrees,
     usually less than tables and units round.
     """
-    given, expected = _numbers(before), _numbers(value)
-    if not given or not all(map(number, given)):
+    existing_numbers, expected = _numbers(existing), _numbers(value)
+    if not existing_numbers or not all(map(number, existing_numbers)):
         return True
-    return len(given) == len(expected) and all(
-        isclose(a, b, rel_tol=within, abs_tol=1e-12) for a, b in zip(given, expected, strict=True)
+    return len(existing_numbers) == len(expected) and all(
+        isclose(a, b, rel_tol=within, abs_tol=1e-12)
+        for a, b in zip(existing_numbers, expected, strict=True)
     )
 
 
@@ -58,15 +59,15 @@ def one_line(where: str, **also: str) -> Iterator[None]:
         yield
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
-        key, words = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        key, message = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
         at = f"{where}{key}".rstrip(" .:")
-        raise ValueError(f"{at}: {words[0].lower()}{words[1:]}{also.get(key, '')}") from None
+        raise ValueError(f"{at}: {message[0].lower()}{message[1:]}{also.get(key, '')}") from None
 
 
-def shown(value: object) -> str:
+def value_text(value: object) -> str:
     """A number, or several, in words."""
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(shown, value))}]"
+        return f"[{', '.join(map(value_text, value))}]"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any
 
 from softehl.cases.seal.gland.grooves import gland
-from softehl.cases.seal.gland.key_values import shown
+from softehl.cases.seal.gland.key_values import value_text
 from softehl.cases.seal.gland.oils import DENSITY
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import Gland
@@ -32,28 +32,28 @@ def foreword(p: Seal, pressure: float) -> list[str]:
 def warnings(p: Seal, pressure: float) -> list[str]:
     """A pressure above what is known to run, keys without effect, what is unusual, a line each."""
     load, beyond = _load(p, pressure)
-    words = "the run may take minutes and end without a film; a harder rubber or a lower pressure"
-    first = [f"{load}; {words} helps"] if beyond else []
+    message = "the run may take minutes and end without a film; a harder rubber or a lower pressure"
+    first = [f"{load}; {message} helps"] if beyond else []
     return [*first, *_unused(p), *_unusual(p), *handbook(p)]
 
 
 def _load(p: Seal, pressure: float) -> tuple[str, bool]:
     """The ratio of pressure to modulus in words, and whether it is above what is known to run."""
-    found = p.load_ratio(pressure)
+    ratio = p.load_ratio(pressure)
     if p.round:
-        most = 3.0
+        limit = 3.0
         sample = (
             "in a sample of O-rings all films were found at ratios to 4, nine of ten at 4 to 5; "
             "above 5 states are uncertain, and nothing was tried above 5.4"
         )
     else:
-        most = 2.0
+        limit = 2.0
         sample = (
             "in a sample of sections other than round all films were found at ratios to 2, "
             "four of five at 2 to 4, half of them at 4 to 5; nothing was tried above 4.9"
         )
-    words = f"sealed pressure / shear modulus = {found:.2g}: {sample} (docs/limits.md)"
-    return words, found > most
+    message = f"sealed pressure / shear modulus = {ratio:.2g}: {sample} (docs/limits.md)"
+    return message, ratio > limit
 
 
 # --- warnings -----------------------------------------------------------------------------------
@@ -82,7 +82,7 @@ def _unused(p: Seal) -> Iterator[str]:
     for key, (used, needed) in _NEEDS.items():
         value = getattr(p, key)
         if value != type(p).model_fields[key].default and not used(p):
-            yield f"{key} = {shown(value)} has no effect without {needed}"
+            yield f"{key} = {value_text(value)} has no effect without {needed}"
 
 
 def _unusual(p: Seal) -> Iterator[str]:
@@ -121,10 +121,10 @@ def _cold(p: Seal) -> Iterator[str]:
     if heat is None:
         return
     if p.shore_A is not None and heat < 0.0:
-        near = f", the more the nearer to {GLASS[p.polymer]:g} degC" if p.polymer in GLASS else ""
+        note = f", the more the nearer to {GLASS[p.polymer]:g} degC" if p.polymer in GLASS else ""
         yield (
             f"temperature = {heat:g} degC: the modulus is that of a hardness at room temperature; "
-            f"rubber is stiffer in the cold{near}; give mu at this temperature, or tests (fit)"
+            f"rubber is stiffer in the cold{note}; give mu at this temperature, or tests (fit)"
         )
     if p.oil is None:
         return
@@ -157,19 +157,19 @@ def handbook(p: Gland) -> Iterator[str]:
 # --- values assumed where keys were not given ---------------------------------------------------
 
 
-def assumed(p: Seal, given: Collection[str]) -> list[str]:
-    """Important values that were not given.  given: the keys that were."""
-    said = frozenset(given)
-    return [*_ring(p, said), *_gland(p, said), *_fluids(p, said)]
+def assumed(p: Seal, set_keys: Collection[str]) -> list[str]:
+    """Important values that were not given.  set_keys: the keys that were."""
+    keys_set = frozenset(set_keys)
+    return [*_ring(p, keys_set), *_gland(p, keys_set), *_fluids(p, keys_set)]
 
 
-def _ring(p: Seal, said: frozenset[str]) -> Iterator[str]:
+def _ring(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
     """Ring and rubber."""
-    if not said & {"ring", "section_diameter", "outline"}:
+    if not keys_set & {"ring", "section_diameter", "outline"}:
         yield f"a section of {p.section_diameter:g} mm"
-    if p.section != ROUND and not said & set(dimensions(p.section)):
+    if p.section != ROUND and not keys_set & set(dimensions(p.section)):
         yield f"the usual proportions of section {p.section}"
-    if not said & {"ring", "inner_diameter"}:
+    if not keys_set & {"ring", "inner_diameter"}:
         yield f"inner diameter {p.ring_diameter:g} mm"
     if p.shore_A is not None:
         low, high = shore_band(p.shore_A, p.polymer)
@@ -179,18 +179,18 @@ def _ring(p: Seal, said: frozenset[str]) -> Iterator[str]:
         )
         if p.temperature is not None:
             yield f"its modulus at room temperature, not at {p.temperature:g} degC"
-    elif p.energy == "mooney_rivlin" and len(unsaid := {"mu_1", "mu_2"} - said) == 1:
+    elif p.energy == "mooney_rivlin" and len(unsaid := {"mu_1", "mu_2"} - keys_set) == 1:
         (name,) = unsaid
         yield f"{name} = {getattr(p, name):g} MPa"
-    elif not said & {"fit", "shore_A", *materials.KEYS}:
+    elif not keys_set & {"fit", "shore_A", *materials.KEYS}:
         yield f"a rubber of shear modulus {p.shear_modulus:.3g} MPa"
 
 
-def _gland(p: Gland, said: frozenset[str]) -> Iterator[str]:
+def _gland(p: Gland, keys_set: frozenset[str]) -> Iterator[str]:
     """Rod and groove."""
     if p.ring and read_ring(p.ring).outer is not None:
-        said |= {"rod", "housing_diameter", "groove_width"}  # a U-cup is named by its groove
-    if not said & {"rod", "rod_diameter", "bore"}:
+        keys_set |= {"rod", "housing_diameter", "groove_width"}  # a U-cup is named by its groove
+    if not keys_set & {"rod", "rod_diameter", "bore"}:
         yield f"a rod of {p.rod_diameter:g} mm"
     kind, charted = _kind(p)
     decided = {
@@ -199,10 +199,10 @@ def _gland(p: Gland, said: frozenset[str]) -> Iterator[str]:
     }
     if not charted:  # assumed even if the gland was asked for by name
         decided = {key: set() for key in decided}
-    if unsaid := [key for key, others in decided.items() if not said & {key, *others}]:
-        words = (f"{p.called(key)} = {abs(getattr(p, key)):g} mm" for key in unsaid)
-        yield f"{kind} ({', '.join(words)})"
-    if not said & {"backup", "extrusion_gap"}:
+    if unsaid := [key for key, others in decided.items() if not keys_set & {key, *others}]:
+        texts = (f"{p.called(key)} = {abs(getattr(p, key)):g} mm" for key in unsaid)
+        yield f"{kind} ({', '.join(texts)})"
+    if not keys_set & {"backup", "extrusion_gap"}:
         yield "a back-up ring"
 
 
@@ -219,19 +219,19 @@ def _kind(p: Gland) -> tuple[str, bool]:
     return "its standard gland", True
 
 
-def _fluids(p: Seal, said: frozenset[str]) -> Iterator[str]:
+def _fluids(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
     """Pressure and oil."""
-    if "sealed_pressure" not in said:
+    if "sealed_pressure" not in keys_set:
         yield f"a sealed pressure of {p.sealed_pressure:g} MPa"
-    if not said & {"viscosity", "oil"}:
+    if not keys_set & {"viscosity", "oil"}:
         yield f"an oil of {1e9 * p.viscosity:.3g} mPa s"
     if p.oil is not None and read_oil_name(p.oil).points:
-        words = [] if "oil_density" in said else [f"the density {DENSITY:g} kg/m3 at 15 degC"]
-        if not said & {"pressure_viscosity", "roelands"}:
-            words.append(f"the pressure-viscosity coefficient {p.pressure_viscosity:.3g} 1/MPa")
-        if words:
-            yield f"{' and '.join(words)}, of a mineral oil"
-    elif "viscosity" in said and not said & {"pressure_viscosity", "roelands"}:
+        texts = [] if "oil_density" in keys_set else [f"the density {DENSITY:g} kg/m3 at 15 degC"]
+        if not keys_set & {"pressure_viscosity", "roelands"}:
+            texts.append(f"the pressure-viscosity coefficient {p.pressure_viscosity:.3g} 1/MPa")
+        if texts:
+            yield f"{' and '.join(texts)}, of a mineral oil"
+    elif "viscosity" in keys_set and not keys_set & {"pressure_viscosity", "roelands"}:
         yield f"a pressure-viscosity coefficient of {p.pressure_viscosity:g} 1/MPa"
     if p.oil and read_oil_name(p.oil).improved:
         yield f"a viscosity index of {IMPROVED:g}, the least that HVLP oils have (DIN 51524-3)"

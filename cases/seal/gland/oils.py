@@ -62,10 +62,10 @@ def read_oil(text: str) -> Walther:
     if name.grade is None:
         return Walther.through(*name.points)
     if name.grade not in GRADES:
-        near = sorted(GRADES, key=lambda g: abs(log(g / name.grade)) if name.grade else g)[:2]
+        nearest = sorted(GRADES, key=lambda g: abs(log(g / name.grade)) if name.grade else g)[:2]
         raise ValueError(
             f'oil = "{text}": there is no grade {name.grade}; nearest: '
-            f"{' and '.join(f'ISO VG {g}' for g in sorted(near))}"
+            f"{' and '.join(f'ISO VG {g}' for g in sorted(nearest))}"
         )
     at_40 = float(name.grade)
     at_100 = GRADES[name.grade] if name.index is None else at_100_of_index(at_40, name.index)

@@ -29,7 +29,7 @@ from softehl.cases.seal.gland.trade.parse_terms import SaidKeys, with_limits
 from softehl.cases.seal.gland.validation import require_consistent
 
 
-def _own(record: type[Parameters]) -> tuple[str, ...]:
+def _declared_keys(record: type[Parameters]) -> tuple[str, ...]:
     """Keys that a record declares itself, in order."""
     return tuple(name for name in record.__annotations__ if name in record.model_fields)
 
@@ -46,21 +46,21 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
         *("backup", "compound", "shore_A", "fit", "oil", "oil_density", "roelands", "said"),
     )
     headings: ClassVar = {
-        "ring": (*_own(FreeSeal), *_own(SectionKeys), *MEASURES),
-        "gland": _own(Gland),
+        "ring": (*_declared_keys(FreeSeal), *_declared_keys(SectionKeys), *MEASURES),
+        "gland": _declared_keys(Gland),
         "rubber": (*dict.fromkeys(("compound", "shore_A", *Rubber.model_fields)), "materials"),
-        "oil": (*_own(Oil), *ThinningKeys.model_fields),
+        "oil": (*_declared_keys(Oil), *ThinningKeys.model_fields),
         "motion": ("sealed_pressure", "speeds", "stroke", "travel"),
-        "film": (*Surfaces.model_fields, *_own(FilmModel)),
+        "film": (*Surfaces.model_fields, *_declared_keys(FilmModel)),
         "mesh": ("density", "tolerance", "error_estimate", "mesh"),
         "numerics": (
             *("sensitivity", "tolerances", "pressure_order", "reynolds", "quadrature"),
             *("quadrature_points", "upwinding", "solid", "rotation", "solver", "linear", "said"),
         ),
     }
-    words: ClassVar = {
-        word: f"write {answer}"
-        for answer, words in {
+    hints: ClassVar = {
+        word: f"write {hint}"
+        for hint, words in {
             'bore = "40 H8"': ("piston", "cylinder", "piston_diameter", "bore_diameter"),
             "sealed_pressure": ("pressure", "p", "p_s"),
             "speeds": ("speed", "velocity", "u"),

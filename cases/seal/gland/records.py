@@ -236,13 +236,13 @@ class FreeSeal(SectionKeys):
     @property
     def sizes(self) -> dict[str, float]:
         """The dimensions that are given, as their page calls them.  ValueError for others'."""
-        known = dimensions(self.section)
-        given = {name: size for name in MEASURES if (size := getattr(self, name)) is not None}
-        for name in given:
-            if name not in known:
-                has = ", ".join(known) or "section_diameter alone"
+        names = dimensions(self.section)
+        lengths = {name: size for name in MEASURES if (size := getattr(self, name)) is not None}
+        for name in lengths:
+            if name not in names:
+                has = ", ".join(names) or "section_diameter alone"
                 raise ValueError(f'{name} is no dimension of section = "{self.section}": {has}')
-        return {"height": self.section_diameter, **{known[n]: size for n, size in given.items()}}
+        return {"height": self.section_diameter, **{names[n]: size for n, size in lengths.items()}}
 
     @property
     def axial_width(self) -> float:
@@ -258,7 +258,9 @@ class FreeSeal(SectionKeys):
         if self.round or self.outline is not None:
             return {}
         page = SECTIONS[self.section](**self.sizes)
-        return {name: getattr(page, own) for name, own in dimensions(self.section).items()}
+        return {
+            name: getattr(page, field_name) for name, field_name in dimensions(self.section).items()
+        }
 
     @property
     def lobes(self) -> int:
@@ -305,8 +307,8 @@ class Solid(FreeSeal, Rubber, Discretisation):
         if self.mesh != "file" or not self.materials:
             return True
         mesh = self.file_mesh
-        own = set[int]().union(*(mesh.regions[name].tolist() for name in self.materials))
-        return len(own) < len(mesh.quads)
+        cells = set[int]().union(*(mesh.regions[name].tolist() for name in self.materials))
+        return len(cells) < len(mesh.quads)
 
     def load_ratio(self, pressure: float) -> float:
         """A pressure (MPa) over the shear modulus of the softest part of the section."""

@@ -54,7 +54,7 @@ class ThinningKeys(Parameters):
     @property
     def thins(self) -> str:
         """Name of the law, empty for a Newtonian oil."""
-        return self.shear_thinning or next(filter(self._given, _USUAL), "")
+        return self.shear_thinning or next(filter(self._set_keys, _USUAL), "")
 
     def thinning_values(self, viscosity: float) -> Mapping[str, float]:
         """Parameters of the kernels of films that thin; viscosity: at rest and zero pressure."""
@@ -79,20 +79,20 @@ class ThinningKeys(Parameters):
         asks: what cannot be had with a penalty -> whether it is given; "roughness" is one. Flow
         factors and facets are those of a Newtonian oil.
         """
-        for what, given in asks.items():
-            if given and not conserving:
+        for what, requested in asks.items():
+            if requested and not conserving:
                 raise ValueError(
                     f'cavitation = "penalty" does not work with {what}; leave cavitation out'
                 )
         if conserving and dg:
             raise ValueError('reynolds = "dg" works with cavitation = "penalty" only; use "fe"')
-        for what, given in (('reynolds = "dg"', dg), ("roughness", asks["roughness"])):
-            if given and self.thins:
+        for what, requested in (('reynolds = "dg"', dg), ("roughness", asks["roughness"])):
+            if requested and self.thins:
                 raise ValueError(
                     f"{what} needs a Newtonian oil; leave it or the keys of {self.thins} out"
                 )
 
-    def _given(self, law: str) -> list[str]:
+    def _set_keys(self, law: str) -> list[str]:
         """Keys of a law that have a value."""
         return [n for n in NUMBERS if n.startswith(law) and getattr(self, n) is not None]
 
@@ -102,9 +102,9 @@ class ThinningKeys(Parameters):
         if not law:
             return self
         for other in _USUAL:
-            if other != law and (wrong := self._given(other)):
+            if other != law and (conflicting := self._set_keys(other)):
                 also = f'shear_thinning = "{law}"' if self.shear_thinning else law
-                raise ValueError(f"{wrong[0]} is no key of {also}; leave one of them out")
+                raise ValueError(f"{conflicting[0]} is no key of {also}; leave one of them out")
         if self.carreau_stress and self.carreau_rate:
             raise ValueError(
                 f"carreau_stress = {self.carreau_stress:g} and carreau_rate = "

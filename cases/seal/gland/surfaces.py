@@ -25,18 +25,18 @@ MIXED, FULL = 1.0, 3.0
 """Lambda ratios (least h_T over sigma) below which a film is one of boundary, of mixed friction."""
 
 
-def _pair(given: object) -> object:
+def _pair(value: object) -> object:
     """A single number is that of the surface that rests, over a smooth one that moves."""
-    if isinstance(given, (list, tuple)):
-        return [_height(item) for item in given]
-    height = _height(given)
+    if isinstance(value, (list, tuple)):
+        return [_height(item) for item in value]
+    height = _height(value)
     return (0.0, height) if number(height) else height
 
 
 def _height(item: object) -> object:
     """An rms height, also of a finish, "Ra 0.2"."""
-    found = read_finish(item) if isinstance(item, str) else None
-    return item if found is None else found
+    height = read_finish(item) if isinstance(item, str) else None
+    return item if height is None else height
 
 
 def _some(rms: float) -> float:

@@ -71,72 +71,76 @@ def read_tolerances(p: Seal) -> Shares:
         raise ValueError(f"tolerances: {twice[0]} is given twice; leave one of them out")
     of_ring = [f"{key} {tolerance!r} mm" for key, _, tolerance in ring_sizes(p.ring)]
     of_limits = [
-        f"{LIMITED[name]} {found.half:.9f} mm" for name, _, found in bands(p.said, piston=p.piston)
+        f"{LIMITED[name]} {band.half:.9f} mm" for name, _, band in bands(p.said, piston=p.piston)
     ]
     return dict([*(_share(text, p) for text in (*of_ring, *of_limits)), *typed])
 
 
 def _share(text: str, p: Seal) -> tuple[str, dict[str, float]]:
     """The name of a tolerance, and the share by which it moves each parameter.  ValueError."""
-    found = _ITEM.fullmatch(text.strip())
-    if found and found["name"] in _OF_THE_GLAND:
-        return found["name"], _of_the_gland(found, p)
-    names = _ALIASES.get(found["name"], (found["name"],)) if found else ()
+    match = _ITEM.fullmatch(text.strip())
+    if match and match["name"] in _OF_THE_GLAND:
+        return match["name"], _of_the_gland(match, p)
+    names = _ALIASES.get(match["name"], (match["name"],)) if match else ()
     names = tuple(name for name in names if name in _VARIED and getattr(p, name))
-    known = [value for name in names if isinstance(value := getattr(p, name), float)]
-    metric = found is None or found["unit"] != "mm" or _IN_MM.issuperset(names)
-    if not found or not known or len(known) < len(names) or not metric:
+    numbers = [value for name in names if isinstance(value := getattr(p, name), float)]
+    metric = match is None or match["unit"] != "mm" or _IN_MM.issuperset(names)
+    if not match or not numbers or len(numbers) < len(names) or not metric:
         raise ValueError(
             f'tolerances: "{text}" is not understood; allowed: a key of the case that is a '
             "number other than 0 and has a sensitivity, or modulus, and +- its tolerance, as "
             'in "viscosity 10 %" or "rod_diameter 0.05 mm"'
         )
-    size = float(found["size"])
-    share = 0.01 * size if found["unit"] == "%" else size / abs(known[0])
+    size = float(match["size"])
+    share = 0.01 * size if match["unit"] == "%" else size / abs(numbers[0])
     moved = dict.fromkeys(names, share)
     if p.piston and "section_diameter" in moved:  # less the outside: inside and twice the section
         moved["inner_diameter"] = share * 2.0 * p.section_diameter / -p.inner_diameter
-    return found["name"], moved
+    return match["name"], moved
 
 
-def _of_the_gland(found: re.Match[str], p: Gland) -> dict[str, float]:
+def _of_the_gland(match: re.Match[str], p: Gland) -> dict[str, float]:
     """The share by which a depth, squeeze (points) or fill (points) moves diameter or width."""
-    name, size, unit = found["name"], float(found["size"]), found["unit"]
+    name, size, unit = match["name"], float(match["size"]), match["unit"]
     if unit not in _OF_THE_GLAND[name]:
         unit, usual = _OF_THE_GLAND[name][0], 0.05 if name == "groove_depth" else 2
         raise ValueError(
-            f'tolerances: "{found[0]}" is not understood; write "{name} {usual} {unit}"'
+            f'tolerances: "{match[0]}" is not understood; write "{name} {usual} {unit}"'
         )
     if name == "fill":
         return {"groove_width": size / p.fill_percent}
-    wrong = 0.01 * size * (p.section_diameter if name == "squeeze" else p.depth)
-    return {"housing_diameter": 2.0 * (wrong if unit == "%" else size) / abs(p.housing_diameter)}
+    error = 0.01 * size * (p.section_diameter if name == "squeeze" else p.depth)
+    return {"housing_diameter": 2.0 * (error if unit == "%" else size) / abs(p.housing_diameter)}
 
 
 def ring_sizes(name: str | None) -> list[tuple[str, float, float]]:
     """Sizes of a ring of the catalogue that have a tolerance: key, mm, +- mm; none of a U-cup."""
     if name is None or read_ring(name).kind == "u_cup":
         return []
-    known = ring(name)
+    size = ring(name)
     sizes = (
-        ("section_diameter", known.section_diameter, known.section_tolerance),
-        ("inner_diameter", known.inner_diameter, known.inner_tolerance),
+        ("section_diameter", size.section_diameter, size.section_tolerance),
+        ("inner_diameter", size.inner_diameter, size.inner_tolerance),
     )
     return [(key, value, tolerance) for key, value, tolerance in sizes if tolerance]
 
 
 def band(
-    place: tuple[float, float], quantity: str, slopes: Mapping[str, float], shares: Shares
+    operating_point: tuple[float, float],
+    quantity: str,
+    log_derivatives: Mapping[str, float],
+    tolerances: Shares,
 ) -> ToleranceRow:
-    """Effect of tolerances on one quantity; place: p_s and U; slopes: its log derivatives."""
+    """Effect of tolerances on a quantity at an operating point (p_s, U), by its log derivatives."""
     parts = {
-        name: 100.0 * abs(sum(slopes.get(key, 0.0) * share for key, share in moved.items()))
-        for name, moved in shares.items()
+        name: 100.0
+        * abs(sum(log_derivatives.get(key, 0.0) * share for key, share in moved.items()))
+        for name, moved in tolerances.items()
     }
     largest = max(parts, key=lambda name: parts[name])
     return ToleranceRow(
-        sealed_pressure_MPa=place[0],
-        rod_speed_mm_s=place[1],
+        sealed_pressure_MPa=operating_point[0],
+        rod_speed_mm_s=operating_point[1],
         quantity=quantity,
         worst_percent=sum(parts.values()),
         likely_percent=math.hypot(*parts.values()),

@@ -175,17 +175,17 @@ def _ring_fits_the_rod(p: Gland) -> None:
     stretch = p.rod_diameter / p.inner_diameter - 1.0
     if -0.1 <= stretch <= 0.2:
         return
-    words = (
+    message = (
         f"rod_diameter = {p.rod_diameter:g} mm stretches inner_diameter = {p.inner_diameter:g} mm "
         f"by {100 * stretch:.3g} %"
     )
     if p.piston:
-        words = (
+        message = (
             f"bore = {-p.rod_diameter:g} mm is {100 * abs(stretch):.3g} % "
             f"{'larger' if stretch > 0.0 else 'smaller'} than the ring outside, "
             f"{-p.inner_diameter:g} mm"
         )
-    raise ValueError(f"{words}; allowed are -10 to 20 %")
+    raise ValueError(f"{message}; allowed are -10 to 20 %")
 
 
 def _section_is_between_the_walls(p: Gland) -> None:
@@ -205,10 +205,10 @@ def _section_is_between_the_walls(p: Gland) -> None:
 
 
 def _pressure_is_within_reach(p: Seal) -> None:
-    found = p.load_ratio(p.sealed_pressure)
-    if found > _MOST:
+    ratio = p.load_ratio(p.sealed_pressure)
+    if ratio > _MOST:
         raise ValueError(
-            f"sealed_pressure = {p.sealed_pressure:g} MPa is {found:.2g} times the shear modulus "
+            f"sealed_pressure = {p.sealed_pressure:g} MPa is {ratio:.2g} times the shear modulus "
             f"of the rubber; films are found up to {_MOST:g} times (docs/limits.md); take a harder "
             "rubber or a lower pressure"
         )

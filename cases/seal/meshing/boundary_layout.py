@@ -60,56 +60,59 @@ class BoundaryLayout:
         film: tuple[float, float],
         spacing: Spacing | None,
         long: int,
-        least: float = 0.0,
+        smallest: float = 0.0,
     ) -> BoundaryLayout:
         """With `long` segments at density 1 between the places of the film, None = equal ones.
 
-        least: length at density 1, mm, below which no corner makes the others.
+        smallest: length at density 1, mm, below which no corner makes the others.
         """
         length, first = outline.length, film[0]
         last = first + (film[1] - first) % length
         reach = ball_radii(outline, 1.0)
         s = np.linspace(last, first + length, 4001)
-        wide, ends = np.maximum(reach, least / _SEGMENT), _film_sizes(last - first, spacing, long)
-        size = _sizes(outline, s, wide, ends)
+        wide, end_sizes = (
+            np.maximum(reach, smallest / _SEGMENT),
+            _film_sizes(last - first, spacing, long),
+        )
+        size = _sizes(outline, s, wide, end_sizes)
         index = cumulative_trapezoid(1.0 / size, s, initial=0)
         corners = np.sort(first + (outline.corners(_PINNED) - first) % length)
-        apart = 0.2 * length / AROUND
-        corners = corners[(corners > last + apart) & (corners < first + length - apart)]
+        distance = 0.2 * length / AROUND
+        corners = corners[(corners > last + distance) & (corners < first + length - distance)]
         parts = [(first, last, spacing, long)]
         for a, b in pairwise([last, *corners.tolist(), first + length]):
             begin, end = np.interp([a, b], s, index)
             # corners are at ends of the triangles' sides, which are two segments, at any density
             odd = 3 * (long % 2) if len(parts) == 1 else 0
             count = odd + 6 * max(1 - odd // 3, ceil((end - begin - odd) / 6 - 0.2))
-            places = np.interp(np.linspace(begin, end, _STEPS + 1), index, s)
-            parts.append((a, b, Spacing((places - a) / (b - a)), count))
+            positions = np.interp(np.linspace(begin, end, _STEPS + 1), index, s)
+            parts.append((a, b, Spacing((positions - a) / (b - a)), count))
         return cls(outline, tuple(parts), reach)
 
-    def places(self, density: Fraction) -> Array:
+    def positions(self, density: Fraction) -> Array:
         """s of the boundary nodes, rising from the start of the film."""
-        found = []
+        per_segment = []
         for a, b, spacing, count in self.parts:
             n = int(count * density)
             t = np.arange(n) / n
-            found.append(a + (b - a) * (spacing(t) if spacing else t))
-        return np.concatenate(found)
+            per_segment.append(a + (b - a) * (spacing(t) if spacing else t))
+        return np.concatenate(per_segment)
 
     def lengths(self, density: Fraction, s: Array) -> Array:
         """Lengths (n,) of the longer segment of this density at nodes at s, mm."""
-        places = self.places(density)
-        after = np.diff(np.append(places, places[0] + self.outline.length))
+        positions = self.positions(density)
+        after = np.diff(np.append(positions, positions[0] + self.outline.length))
         longer = np.maximum(after, np.roll(after, 1))
-        return np.asarray(np.interp(s, places, longer, period=self.outline.length))
+        return np.asarray(np.interp(s, positions, longer, period=self.outline.length))
 
     def depth(self, s: Array) -> Array:
         """Thickness (n,) of the strip, mm."""
         length = self.outline.length
-        own = np.minimum(_usual_depth(self.outline), _CLEAREST * self.reach)
+        local_depth = np.minimum(_usual_depth(self.outline), _CLEAREST * self.reach)
         stations = np.arange(_STATIONS) * length / _STATIONS
-        apart = np.abs(s[:, None] - stations) % length
-        apart = np.minimum(apart, length - apart)
-        return np.asarray((own + _SLOPE * apart).min(axis=1))
+        distance = np.abs(s[:, None] - stations) % length
+        distance = np.minimum(distance, length - distance)
+        return np.asarray((local_depth + _SLOPE * distance).min(axis=1))
 
 
 def _usual_depth(outline: Outline) -> float:
@@ -130,10 +133,10 @@ def _sizes(outline: Outline, s: Array, reach: Array, film: tuple[float, float]) 
     clear = np.minimum(_SEGMENT * reach, _ACROSS * ball_radii(outline, -1.0))
     bend = np.abs(outline.curvature(s)) + 1e-9 / outline.length
     size = np.minimum(np.interp(s, stations, clear, period=outline.length), _TURN / bend)
-    beside = np.minimum(film[1] + _RATE * (s - s[0]), film[0] + _RATE * (s[-1] - s))
-    least = np.maximum(film[1] - _RATE * (s - s[0]), film[0] - _RATE * (s[-1] - s))
-    size = np.maximum(size, np.maximum(_SHORTEST * least, 0.02 * outline.length / AROUND))
-    size = np.minimum(np.minimum(size, beside), outline.length / AROUND)
+    upper = np.minimum(film[1] + _RATE * (s - s[0]), film[0] + _RATE * (s[-1] - s))
+    lower = np.maximum(film[1] - _RATE * (s - s[0]), film[0] - _RATE * (s[-1] - s))
+    size = np.maximum(size, np.maximum(_SHORTEST * lower, 0.02 * outline.length / AROUND))
+    size = np.minimum(np.minimum(size, upper), outline.length / AROUND)
     size = np.minimum.accumulate(size - _RATE * s) + _RATE * s
     return np.asarray(np.minimum.accumulate((size + _RATE * s)[::-1])[::-1] - _RATE * s)
 
@@ -157,9 +160,9 @@ def ball_radii(outline: Outline, side: float) -> Array:
     x, n = outline.at(s), side * normals(outline, s, over)
     away = x[None] - x[:, None]
     inwards = (away * n[:, None]).sum(axis=2)
-    apart = np.abs(s[:, None] - s)
-    apart = np.minimum(apart, outline.length - apart)
-    seen = (inwards > 1e-9) & (apart > 2.0 * over)
+    distance = np.abs(s[:, None] - s)
+    distance = np.minimum(distance, outline.length - distance)
+    seen = (inwards > 1e-9) & (distance > 2.0 * over)
     radii = (away**2).sum(axis=2) / (2.0 * np.where(seen, inwards, 1.0))
     result = np.asarray(radii.min(axis=1, where=seen, initial=np.inf))
     result.flags.writeable = False

@@ -46,13 +46,13 @@ class Line:
 
     def heading(self, s: Array) -> Array:
         """Angles (n,) of the tangent against +z, rad; steady along the piece."""
-        way = atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
-        return np.full(len(s), way)
+        angle = atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
+        return np.full(len(s), angle)
 
     def nearest(self, points: Array) -> Array:
         """Lengths (n,) behind the start of the nearest points of the piece to those, (n, 2)."""
-        way = (np.array(self.end) - np.array(self.start)) / self.length
-        return np.asarray(np.clip((points - np.array(self.start)) @ way, 0.0, self.length))
+        direction = (np.array(self.end) - np.array(self.start)) / self.length
+        return np.asarray(np.clip((points - np.array(self.start)) @ direction, 0.0, self.length))
 
     def reversed(self) -> Line:
         """Piece from its end to its start."""
@@ -60,7 +60,7 @@ class Line:
 
     def part(self, begin: float, end: float) -> Line:
         """The piece between two lengths behind its start."""
-        return Line(*_ends(self, begin, end))
+        return Line(*_end_points(self, begin, end))
 
     def moved(self, scale: float, shift: Point) -> Line:
         """The piece scaled about the origin, then shifted."""
@@ -114,8 +114,8 @@ class Arc:
     def at(self, s: Array) -> Array:
         """Points (n, 2) at the lengths s (n,) behind the start."""
         angle = self.first + s * self.curvature
-        way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        return np.asarray(np.array(self.centre) + self.radius * way)
+        direction = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        return np.asarray(np.array(self.centre) + self.radius * direction)
 
     def heading(self, s: Array) -> Array:
         """Angles (n,) of the tangent against +z, rad; steady along the piece."""
@@ -140,7 +140,7 @@ class Arc:
 
     def part(self, begin: float, end: float) -> Arc:
         """The piece between two lengths behind its start."""
-        return Arc(*_ends(self, begin, end), self.centre, self.ccw)
+        return Arc(*_end_points(self, begin, end), self.centre, self.ccw)
 
     def moved(self, scale: float, shift: Point) -> Arc:
         """The piece scaled about the origin, then shifted."""
@@ -165,7 +165,7 @@ class Arc:
 Piece: TypeAlias = Line | Arc
 
 
-def _ends(piece: Piece, begin: float, end: float) -> tuple[Point, Point]:
+def _end_points(piece: Piece, begin: float, end: float) -> tuple[Point, Point]:
     """The points at two lengths behind the start of a piece; its own ends exactly."""
     (a, b), (c, d) = piece.at(np.array([begin, end])).tolist()
     return piece.start if begin <= 0.0 else (a, b), piece.end if end >= piece.length else (c, d)
@@ -200,12 +200,12 @@ def rounded(points: Sequence[Point], radii: Sequence[float] | float) -> list[Pie
 
 
 def _fillet(
-    before: Point, at: Point, after: Point, radius: float
+    previous: Point, at: Point, after: Point, radius: float
 ) -> tuple[float, Arc | None, Point]:
     """Shortened sides of a corner with a fillet, the fillet, and its end."""
     if radius == 0.0:
         return 0.0, None, at
-    a, b = np.subtract(at, before), np.subtract(after, at)
+    a, b = np.subtract(at, previous), np.subtract(after, at)
     a, b = a / np.hypot(*a), b / np.hypot(*b)
     turn = atan2(a[0] * b[1] - a[1] * b[0], float(a @ b))
     if abs(turn) < _STRAIGHT or abs(turn) > _BACK:
@@ -214,8 +214,8 @@ def _fillet(
     left = 1.0 if turn > 0.0 else -1.0
     start, end = np.array(at) - cut * a, np.array(at) + cut * b
     centre = start + left * radius * np.array([-a[1], a[0]])
-    ends = [(float(p[0]), float(p[1])) for p in (start, end, centre)]
-    return cut, Arc(ends[0], ends[1], ends[2], turn > 0.0), ends[1]
+    corners = [(float(p[0]), float(p[1])) for p in (start, end, centre)]
+    return cut, Arc(corners[0], corners[1], corners[2], turn > 0.0), corners[1]
 
 
 def meetings(one: Piece, other: Piece, within: float) -> list[Point]:
@@ -224,17 +224,17 @@ def meetings(one: Piece, other: Piece, within: float) -> list[Point]:
     Of pieces that lie upon one another, ends that they share are named.
     """
     if isinstance(one, Line) and isinstance(other, Line):
-        found = _line_line(one, other)
+        points = _line_line(one, other)
     elif isinstance(one, Line) and isinstance(other, Arc):
-        found = _line_circle(one, other, within)
+        points = _line_circle(one, other, within)
     elif isinstance(one, Arc) and isinstance(other, Line):
-        found = _line_circle(other, one, within)
+        points = _line_circle(other, one, within)
     else:
         assert isinstance(one, Arc)
         assert isinstance(other, Arc)
-        found = _circle_circle(one, other, within)
-    found += [one.start, one.end, other.start, other.end]
-    return [p for p in found if _on(one, p, within) and _on(other, p, within)]
+        points = _circle_circle(one, other, within)
+    points += [one.start, one.end, other.start, other.end]
+    return [p for p in points if _on(one, p, within) and _on(other, p, within)]
 
 
 def _on(piece: Piece, point: Point, within: float) -> bool:
@@ -254,24 +254,24 @@ def _line_line(one: Line, other: Line) -> list[Point]:
 
 
 def _line_circle(line: Line, arc: Arc, within: float) -> list[Point]:
-    way = (np.array(line.end) - np.array(line.start)) / line.length
+    direction = (np.array(line.end) - np.array(line.start)) / line.length
     start = np.array(line.start) - np.array(arc.centre)
-    middle = -float(start @ way)
-    foot = start + middle * way
+    middle = -float(start @ direction)
+    foot = start + middle * direction
     under = arc.radius**2 - float(foot @ foot)
     if under < -2.0 * within * arc.radius:
         return []
     half = max(under, 0.0) ** 0.5
-    points = [np.array(arc.centre) + foot + side * half * way for side in (-1.0, 0.0, 1.0)]
+    points = [np.array(arc.centre) + foot + side * half * direction for side in (-1.0, 0.0, 1.0)]
     return [(float(p[0]), float(p[1])) for p in points]
 
 
 def _circle_circle(one: Arc, other: Arc, within: float) -> list[Point]:
     z, r = other.centre[0] - one.centre[0], other.centre[1] - one.centre[1]
-    apart = hypot(z, r)
-    if apart <= within:
+    distance = hypot(z, r)
+    if distance <= within:
         return []
-    along = (apart**2 + one.radius**2 - other.radius**2) / (2.0 * apart)
+    along = (distance**2 + one.radius**2 - other.radius**2) / (2.0 * distance)
     half = max(one.radius**2 - along**2, 0.0) ** 0.5
     angle = atan2(r, z)
     c, s = cos(angle), sin(angle)

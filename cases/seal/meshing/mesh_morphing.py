@@ -36,30 +36,30 @@ def carried_places(s: Array, old: Outline, new: Outline) -> Array:
 
 def carried_mesh(mesh: SectionMesh, old: Outline, new: Outline) -> SectionMesh:
     """The mesh of the old outline on the new one.  Raises OutlineError as `carried_places`."""
-    places = carried_places(mesh.places, old, new)
+    positions = carried_places(mesh.positions, old, new)
     moved = np.zeros_like(mesh.points)
-    moved[mesh.boundary] = new.at(places) - mesh.points[mesh.boundary]
+    moved[mesh.boundary] = new.at(positions) - mesh.points[mesh.boundary]
     moved = potential(mesh, moved)
-    return replace(mesh, points=mesh.points + moved, places=places, length=new.length)
+    return replace(mesh, points=mesh.points + moved, positions=positions, length=new.length)
 
 
 def potential(mesh: SectionMesh, values: Array) -> Array:
     """The values (V, k) of the boundary, and inside those of the potential that has them there."""
-    found, stiff = values.copy(), _laplacian(mesh)
+    extended, stiff = values.copy(), _laplacian(mesh)
     inside = np.setdiff1d(np.arange(len(mesh.points)), mesh.boundary)
-    found[inside] = 0.0
-    pulled = -(stiff @ found)[inside]
-    found[inside] = splu(csc_array(stiff[inside][:, inside])).solve(pulled)
-    return found
+    extended[inside] = 0.0
+    pulled = -(stiff @ extended)[inside]
+    extended[inside] = splu(csc_array(stiff[inside][:, inside])).solve(pulled)
+    return extended
 
 
 def _laplacian(mesh: SectionMesh) -> csc_array:
     """Of bilinear shape functions, (V, V): it has none but linear fields to hold still."""
     corners, K = mesh.points[mesh.quads], np.zeros((len(mesh.quads), 4, 4))
     for at in _GAUSS * _CORNERS:
-        slopes = 0.25 * _CORNERS * (1.0 + _CORNERS[:, ::-1] * at[::-1])
-        jacobian = np.einsum("ak,eai->eki", slopes, corners)
-        gradient = np.linalg.solve(jacobian, np.broadcast_to(slopes.T, (len(K), 2, 4)))
+        gradients = 0.25 * _CORNERS * (1.0 + _CORNERS[:, ::-1] * at[::-1])
+        jacobian = np.einsum("ak,eai->eki", gradients, corners)
+        gradient = np.linalg.solve(jacobian, np.broadcast_to(gradients.T, (len(K), 2, 4)))
         K += np.einsum("eia,eib,e->eab", gradient, gradient, np.linalg.det(jacobian))
     rows, columns = np.repeat(mesh.quads, 4, axis=1), np.tile(mesh.quads, 4)
     n = len(mesh.points)

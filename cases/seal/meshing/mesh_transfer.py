@@ -20,9 +20,9 @@ _WITHIN = 1e-12  # of the size of the mesh: a point so near to a cell is in it
 
 def transfer_nodes(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
     """Nodal values (V', k) on the new mesh from those, (V, k), on the old: bilinear."""
-    found = _nearest(old, new.points)
-    weights = CELLS["quad4"].shape(found.parent[:, :2])
-    return np.asarray(np.einsum("na,nak->nk", weights, values[old.quads[found.row]]))
+    located = _nearest(old, new.points)
+    weights = CELLS["quad4"].shape(located.parent[:, :2])
+    return np.asarray(np.einsum("na,nak->nk", weights, values[old.quads[located.row]]))
 
 
 def transfer_elements(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
@@ -30,10 +30,10 @@ def transfer_elements(old: SectionMesh, new: SectionMesh, values: Array) -> Arra
     return np.asarray(values[_nearest(old, new.points[new.quads].mean(axis=1)).row])
 
 
-def _nearest(mesh: SectionMesh, places: Array) -> Located:
+def _nearest(mesh: SectionMesh, points: Array) -> Located:
     """The cell that holds each place (n, 2), or is nearest to it."""
-    near = _WITHIN * float(np.ptp(mesh.points, axis=0).max())
-    return PointLocator(mesh.points, {"quad4": mesh.quads}, near).nearest(places)
+    tolerance = _WITHIN * float(np.ptp(mesh.points, axis=0).max())
+    return PointLocator(mesh.points, {"quad4": mesh.quads}, tolerance).nearest(points)
 
 
 def transfer_boundary(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
@@ -42,9 +42,11 @@ def transfer_boundary(old: SectionMesh, new: SectionMesh, values: Array) -> Arra
     Shape preserving: no value beyond its neighbours.
     """
     period = old.length
-    at = np.concatenate([old.places - period, old.places, old.places + period])
-    places = old.places[0] + np.mod(new.places * (period / new.length) - old.places[0], period)
-    return np.asarray(PchipInterpolator(at, np.tile(values, 3))(places))
+    at = np.concatenate([old.positions - period, old.positions, old.positions + period])
+    positions = old.positions[0] + np.mod(
+        new.positions * (period / new.length) - old.positions[0], period
+    )
+    return np.asarray(PchipInterpolator(at, np.tile(values, 3))(positions))
 
 
 def transfer_chain(
@@ -55,16 +57,16 @@ def transfer_chain(
     Both run counterclockwise without gaps. Shape preserving; beyond the old nodes as at their ends.
     """
     at = places_of(old, nodes)
-    places = places_of(new, new_nodes) * (old.length / new.length)
-    turns = np.round((0.5 * (at[0] + at[-1]) - 0.5 * (places[0] + places[-1])) / old.length)
-    places = np.clip(places + turns * old.length, at[0], at[-1])
-    return np.asarray(PchipInterpolator(at, values)(places))
+    positions = places_of(new, new_nodes) * (old.length / new.length)
+    turns = np.round((0.5 * (at[0] + at[-1]) - 0.5 * (positions[0] + positions[-1])) / old.length)
+    positions = np.clip(positions + turns * old.length, at[0], at[-1])
+    return np.asarray(PchipInterpolator(at, values)(positions))
 
 
 def places_of(mesh: SectionMesh, nodes: Integers) -> Array:
     """Places (n,) of boundary nodes that run counterclockwise, mm, rising."""
     index = np.full(len(mesh.points), -1, dtype=np.int64)
     index[mesh.boundary] = np.arange(len(mesh.boundary))
-    at = mesh.places[index[nodes]]
+    at = mesh.positions[index[nodes]]
     back = np.concatenate([[0], np.cumsum(np.diff(at) < 0.0)])
     return np.asarray(at + back * mesh.length)

@@ -98,8 +98,8 @@ def disc_mesh(disc: Disc, density: int | Fraction) -> SectionMesh:
     around = np.concatenate([n[0, :-1], n[:-1, -1], n[-1, :0:-1], n[:0:-1, 0]])
     rings = np.concatenate([rings, around[None]])
     quads = np.concatenate([grid_cells(np.append(rings, rings[:, :1], axis=1)), grid_cells(n)])
-    boundary, places = np.arange(len(ring)), disc.radius * angles
-    return SectionMesh(points, quads, boundary, long, places, 2.0 * pi * disc.radius)
+    boundary, positions = np.arange(len(ring)), disc.radius * angles
+    return SectionMesh(points, quads, boundary, long, positions, 2.0 * pi * disc.radius)
 
 
 def fine_disc(disc: Disc, depth: float, first: float = inf) -> Disc:
@@ -133,9 +133,9 @@ def _layers(first: float) -> tuple[int, float]:
     return MOST_LAYERS, STEEPEST_GROWTH ** (MOST_LAYERS * _DENSITY)
 
 
-def _growth_to(first: float, count: int, least: float) -> float:
+def _growth_to(first: float, count: int, minimum: float) -> float:
     """Ratio of the last to the first of `count` parts of a line, the first of them this part."""
-    growth = least
+    growth = minimum
     while np.expm1(np.log(growth) / count) / (growth - 1.0) > first:
         growth *= 1.1
     return growth
@@ -168,8 +168,8 @@ def _edge(
 ) -> tuple[Array, Array]:
     """One edge of the central block, between chord and arc: boundary angles and points at t."""
     angle = begin + t * (end - begin)
-    ends = disc.direction(np.array([begin, end])) * np.array([[first], [last]])
-    chord = ends[0] + t[:, None] * (ends[1] - ends[0])
+    edge_points = disc.direction(np.array([begin, end])) * np.array([[first], [last]])
+    chord = edge_points[0] + t[:, None] * (edge_points[1] - edge_points[0])
     arc = disc.direction(angle) * (first + t * (last - first))[:, None]
     return angle, disc.centre + (1.0 - bulge) * chord + bulge * arc
 

@@ -70,8 +70,8 @@ class Outline:
     @classmethod
     def circle(cls, centre: Point, radius: float) -> Outline:
         """A circle; s = 0 at its lowest point."""
-        (z, r), ends = centre, ((centre[0], centre[1] - radius), (centre[0], centre[1] + radius))
-        return cls([Arc(ends[0], ends[1], (z, r)), Arc(ends[1], ends[0], (z, r))])
+        (z, r), poles = centre, ((centre[0], centre[1] - radius), (centre[0], centre[1] + radius))
+        return cls([Arc(poles[0], poles[1], (z, r)), Arc(poles[1], poles[0], (z, r))])
 
     @cached_property
     def disc(self) -> tuple[Point, float] | None:
@@ -79,12 +79,12 @@ class Outline:
         first = self.pieces[0]
         if not isinstance(first, Arc):
             return None
-        whole = Arc(first.start, first.start, first.centre)
-        ends = np.array([piece.start for piece in self.pieces])
-        away = np.linalg.norm(ends - np.array(whole.centre), axis=1) - whole.radius
-        bent = all(abs(piece.curvature * whole.radius - 1.0) < CLOSED for piece in self.pieces)
+        circle = Arc(first.start, first.start, first.centre)
+        starts = np.array([piece.start for piece in self.pieces])
+        away = np.linalg.norm(starts - np.array(circle.centre), axis=1) - circle.radius
+        bent = all(abs(piece.curvature * circle.radius - 1.0) < CLOSED for piece in self.pieces)
         round_ = bent and np.abs(away).max() < CLOSED * self.size
-        return (whole.centre, whole.radius) if round_ else None
+        return (circle.centre, circle.radius) if round_ else None
 
     @property
     def size(self) -> float:
@@ -125,7 +125,7 @@ class Outline:
         """Curvatures (n,) in 1/mm, positive where the outline bends inwards; corners have none."""
         return self._by_piece(s, lambda piece, t: np.full((len(t), 1), piece.curvature))[:, 0]
 
-    def place(self, points: Array) -> Array:
+    def position(self, points: Array) -> Array:
         """s (n,) of the points of the outline nearest to those given, (n, 2)."""
         points = np.asarray(points, dtype=np.float64)
         best, result = np.full(len(points), np.inf), np.zeros(len(points))
@@ -139,9 +139,9 @@ class Outline:
     @cached_property
     def _turns(self) -> Array:
         """Angles (pieces,) by which the tangent turns left at the start of each piece, rad."""
-        ends = [float(piece.heading(np.array([piece.length]))[0]) for piece in self.pieces]
+        headings = [float(piece.heading(np.array([piece.length]))[0]) for piece in self.pieces]
         begins = [float(piece.heading(np.zeros(1))[0]) for piece in self.pieces]
-        turn = np.array(begins) - np.roll(ends, 1)
+        turn = np.array(begins) - np.roll(headings, 1)
         return np.asarray((turn + pi) % tau - pi)
 
     @property
@@ -149,9 +149,9 @@ class Outline:
         """s of the corners, rising."""
         return self.corners(_CORNER)
 
-    def corners(self, least: float) -> Array:
+    def corners(self, minimum: float) -> Array:
         """s of the corners that turn by more than an angle, rad, rising."""
-        return np.asarray(self.starts[:-1][np.abs(self._turns) > least])
+        return np.asarray(self.starts[:-1][np.abs(self._turns) > minimum])
 
     @property
     def area(self) -> float:
@@ -174,23 +174,23 @@ class Outline:
 
     def part(self, begin: float, end: float) -> list[Piece]:
         """The pieces between two places, counterclockwise, in order."""
-        begin, found = begin % self.length, list[Piece]()
+        begin, selected = begin % self.length, list[Piece]()
         end = begin + (end - begin) % self.length
-        ends = [*self.starts[:-1], *(self.starts + self.length)]
-        for number, (a, b) in enumerate(pairwise(ends)):
+        bounds = [*self.starts[:-1], *(self.starts + self.length)]
+        for number, (a, b) in enumerate(pairwise(bounds)):
             first, last = max(begin - a, 0.0), min(end, b) - a
             if last - first > CLOSED * self.size:
-                found.append(self.pieces[number % len(self.pieces)].part(first, last))
-        return found
+                selected.append(self.pieces[number % len(self.pieces)].part(first, last))
+        return selected
 
     def level(self, r: float) -> Array:
         """s (n,) at which the outline is at a radius, in the order of z there; none twice."""
         a, _, c, _ = self.box
         within = CLOSED * self.size
         line = Line((a - self.size, r), (c + self.size, r))
-        found = np.sort([p[0] for piece in self.pieces for p in meetings(line, piece, within)])
-        z = found[np.diff(found, prepend=-np.inf) > 4.0 * within]
-        return self.place(np.stack([z, np.full(len(z), r)], axis=1))
+        crossings = np.sort([p[0] for piece in self.pieces for p in meetings(line, piece, within)])
+        z = crossings[np.diff(crossings, prepend=-np.inf) > 4.0 * within]
+        return self.position(np.stack([z, np.full(len(z), r)], axis=1))
 
     def moved(self, scale: float = 1.0, shift: Point = (0.0, 0.0)) -> Outline:
         """The outline scaled about the origin by a positive factor, then shifted."""
@@ -249,10 +249,10 @@ class Shape:
         """
         assert self.chord is not None
         begin, end = self.chord
-        near, far = self.outline.part(begin, end), self.outline.part(end, begin)
+        lower, far = self.outline.part(begin, end), self.outline.part(end, begin)
         return (
-            Outline([*near, Line(near[-1].end, near[0].start)]),
-            Outline([Line(near[0].start, near[-1].end), *far]),
+            Outline([*lower, Line(lower[-1].end, lower[0].start)]),
+            Outline([Line(lower[0].start, lower[-1].end), *far]),
         )
 
     @classmethod
@@ -262,7 +262,7 @@ class Shape:
         crown: the point at which the sealed pressure ends, at the housing. steepest: degrees.
         """
         film = gentle(outline, radians(steepest))
-        return cls(outline, film, (float(outline.place(np.array([crown]))[0]), film[0]), name)
+        return cls(outline, film, (float(outline.position(np.array([crown]))[0]), film[0]), name)
 
 
 def gentle(outline: Outline, steepest: float) -> tuple[float, float]:
@@ -272,7 +272,7 @@ def gentle(outline: Outline, steepest: float) -> tuple[float, float]:
     """
     lowest = int(np.argmin([piece.box[1] for piece in outline.pieces]))
     at = outline.starts[lowest] + _lowest_of(outline.pieces[lowest])
-    back, on = (_reach(outline, at, steepest, way) for way in (-1, 1))
+    back, on = (_reach(outline, at, steepest, direction) for direction in (-1, 1))
     return float(at - back), float(at + on)
 
 
@@ -283,26 +283,26 @@ def _lowest_of(piece: Piece) -> float:
     return float(piece.nearest(np.array([[z, piece.box[1]]]))[0])
 
 
-def _reach(outline: Outline, at: float, steepest: float, way: int) -> float:
+def _reach(outline: Outline, at: float, steepest: float, direction: int) -> float:
     """Length from a place, forwards (1) or backwards (-1), on which the outline is that gentle."""
     count = len(outline.pieces)
-    k = int(np.searchsorted(outline.starts, at, side="right")) - 1 if way > 0 else (
+    k = int(np.searchsorted(outline.starts, at, side="right")) - 1 if direction > 0 else (
         int(np.searchsorted(outline.starts, at, side="left")) - 1
     )  # fmt: skip
     k, gone = k % count, 0.0
     begin = (at - outline.starts[k]) % outline.length
     for _ in range(count):
         piece = outline.pieces[k]
-        left = piece.length - begin if way > 0 else begin
+        left = piece.length - begin if direction > 0 else begin
         angle = float(piece.heading(np.array([begin]))[0])
         angle = (angle + pi) % tau - pi
         if abs(angle) > steepest + 1e-9:
             break
-        turn = piece.curvature * way
+        turn = piece.curvature * direction
         limit = steepest if turn > 0.0 else -steepest
-        most = (limit - angle) / turn if turn else np.inf
-        if most < left:
-            return gone + most
-        gone, k = gone + left, (k + way) % count
-        begin = 0.0 if way > 0 else outline.pieces[k].length
+        limit_distance = (limit - angle) / turn if turn else np.inf
+        if limit_distance < left:
+            return gone + limit_distance
+        gone, k = gone + left, (k + direction) % count
+        begin = 0.0 if direction > 0 else outline.pieces[k].length
     return gone

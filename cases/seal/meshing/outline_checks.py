@@ -51,7 +51,7 @@ def require_no_spikes(pieces: Sequence[Piece], turns: Array) -> None:
 def require_no_crossing(pieces: Sequence[Piece], within: float) -> None:
     """Pairs of pieces whose boxes meet are looked at; neighbours may share their common end."""
     count = len(pieces)
-    for i, j in _near(pieces, within):
+    for i, j in _near_pairs(pieces, within):
         shared = []
         if (i + 1) % count == j:
             shared.append(pieces[j].start)
@@ -65,7 +65,7 @@ def require_no_crossing(pieces: Sequence[Piece], within: float) -> None:
                 )
 
 
-def _near(pieces: Sequence[Piece], within: float) -> Integers:
+def _near_pairs(pieces: Sequence[Piece], within: float) -> Integers:
     """Pairs (n, 2) of different pieces whose boxes meet."""
     low_z, low_r, high_z, high_r = np.array([piece.box for piece in pieces]).T
     meet: Flags = low_z[:, None] <= high_z[None] + within
@@ -77,8 +77,8 @@ def crossing(loop: Array) -> Array | None:
     """A point (2,) at which the closed polygon of points (n, 2) crosses itself, None if nowhere."""
     along = np.roll(loop, -1, axis=0) - loop
     i, j = np.triu_indices(len(loop), 2)
-    apart = j - i < len(loop) - 1  # the last side is a neighbour of the first
-    i, j = i[apart], j[apart]
+    separate = j - i < len(loop) - 1  # the last side is a neighbour of the first
+    i, j = i[separate], j[separate]
     between, turn = loop[j] - loop[i], cross(along[i], along[j])
     with np.errstate(divide="ignore", invalid="ignore"):
         s, t = cross(between, along[j]) / turn, cross(between, along[i]) / turn

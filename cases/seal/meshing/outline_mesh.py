@@ -40,12 +40,12 @@ class Strip:
     """The layers along an outline, and its nodes off the film.
 
     growth: ratio of the thickness of the innermost to the outermost layer. thick: of the strip, in
-    the usual thickness. least: size of the segments at a corner, mm, at density 1.
+    the usual thickness. minimum: size of the segments at a corner, mm, at density 1.
     """
 
     growth: float = 8.0
     thick: float = 1.0
-    least: float = 0.0
+    minimum: float = 0.0
 
 
 FILM_STRIP = Strip()
@@ -66,7 +66,7 @@ def outline_mesh(
     density: a multiple of 1/3, at least 2/3, that makes `long` d whole. strip: of layers.
     Raises MeshError for others, and where no mesh of sound elements is found.
     """
-    layout = BoundaryLayout.of(shape.outline, film, spacing, long, strip.least)
+    layout = BoundaryLayout.of(shape.outline, film, spacing, long, strip.minimum)
     _require_density(density, long)
     coarse = Fraction(density) / _divisions(Fraction(density))
     best, mesh = 0.0, None
@@ -120,7 +120,7 @@ def _require_density(density: int | Fraction, long: int) -> None:
 
 def _strip(layout: BoundaryLayout, density: Fraction, part: float, growth: float) -> Array:
     """Points (layers + 1, B, 2) from the outline to the front of the strip."""
-    s = layout.places(density)
+    s = layout.positions(density)
     depth = part * layout.depth(s)
     ring = layout.outline.at(s)
     # over half a segment of the coarsest of the family: chords may pass over a small fillet
@@ -159,7 +159,9 @@ def _filled(layout: BoundaryLayout, strip: Array, density: Fraction) -> SectionM
     cells = np.concatenate([_strip_quads(rows, around), numbers[quads]])
     arc = int(layout.parts[0][3] * density)
     boundary = np.arange(around)
-    return SectionMesh(every, cells, boundary, arc, layout.places(density), layout.outline.length)
+    return SectionMesh(
+        every, cells, boundary, arc, layout.positions(density), layout.outline.length
+    )
 
 
 def _three_quads(
@@ -178,9 +180,11 @@ def _three_quads(
         for i in range(3)
     ]
     m = len(front) // 2
-    ends = np.sort(np.stack([np.arange(m), (np.arange(m) + 1) % m], axis=1), axis=1)
+    sorted_ends = np.sort(np.stack([np.arange(m), (np.arange(m) + 1) % m], axis=1), axis=1)
     base = len(corners) + 1
-    at = np.searchsorted(edges[:, 0] * base + edges[:, 1], ends[:, 0] * base + ends[:, 1])
+    at = np.searchsorted(
+        edges[:, 0] * base + edges[:, 1], sorted_ends[:, 0] * base + sorted_ends[:, 1]
+    )
     loop = np.stack([np.arange(m), len(corners) + at], axis=1).ravel()
     ends_and_middles = np.concatenate([corners, corners[edges].mean(axis=1)])
     ends_and_middles[loop] = front

@@ -20,7 +20,7 @@ class SectionMesh:
     points: (V, 2) reference (z, r) in mm. quads: (Q, 4), counterclockwise. boundary: (B,) nodes in
     counterclockwise order from the first node of the arc; segment i joins boundary[i] and
     boundary[i + 1] (cyclic), its outward normal is (dr, -dz)/length. arc: number of segments
-    on the refined arc, which come first. places: (B,) arc lengths of the boundary nodes on the
+    on the refined arc, which come first. positions: (B,) arc lengths of the boundary nodes on the
     undeformed outline, mm, rising, from that of the first node. length: of the whole outline, mm,
     by which places are periodic. regions: name -> numbers of the quads that are of one material.
     """
@@ -29,7 +29,7 @@ class SectionMesh:
     quads: Integers
     boundary: Integers
     arc: int
-    places: Array
+    positions: Array
     length: float
     regions: Mapping[str, Integers] = field(default_factory=dict)
 
@@ -51,7 +51,7 @@ class SectionMesh:
     @property
     def arc_places(self) -> Array:
         """Lengths (arc + 1,) along the undeformed arc from its first node, mm."""
-        return np.asarray(self.places[: self.arc + 1] - self.places[0])
+        return np.asarray(self.positions[: self.arc + 1] - self.positions[0])
 
     @property
     def outer_nodes(self) -> Integers:

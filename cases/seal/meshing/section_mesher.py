@@ -57,7 +57,7 @@ def _round_mesh(
     assert outline.disc is not None
     (z, r), radius = outline.disc
     half = 0.5 * outline.length
-    bottom = float(outline.place(np.array([[z, r - radius]]))[0])
+    bottom = float(outline.position(np.array([[z, r - radius]]))[0])
     begin = (film[0] - bottom + half) % outline.length - half
     end = begin + (film[1] - film[0]) % outline.length
     angles = degrees(begin / radius), degrees(end / radius)
@@ -65,4 +65,4 @@ def _round_mesh(
     if sizes.depth is not None:
         disc = fine_disc(disc, sizes.depth, sizes.first)
     mesh = disc_mesh(disc, density)
-    return replace(mesh, places=mesh.places - mesh.places[0] + film[0])
+    return replace(mesh, positions=mesh.positions - mesh.positions[0] + film[0])

@@ -30,37 +30,37 @@ _STEPS = 27 * 64  # of the table of a map: nodes of every density up to 64 are e
 class Spot:
     """A place to be resolved: s_k in mm, a_k the size there relative to that of other spots.
 
-    most: largest size there, mm.
+    maximum: largest size there, mm.
     """
 
-    place: float
+    position: float
     size: float = 1.0
-    most: float = np.inf
+    maximum: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
 class Spacing:
     """A monotone map of [0, 1] onto itself: where equal steps of index space lie on a line.
 
-    places: (K + 1,), from 0 to 1, the images of k / K.
+    positions: (K + 1,), from 0 to 1, the images of k / K.
     """
 
-    places: Array
+    positions: Array
 
     def __call__(self, t: Array) -> Array:
         """Relative positions (n,) of the relative indices t (n,)."""
-        return np.interp(t, self._indices, self.places)
+        return np.interp(t, self._indices, self.positions)
 
     @classmethod
     def of(cls, s: Array, index: Array) -> Self:
         """Map of a line with so many segments (n,), rising, from its beginning to s (n,)."""
-        places = np.interp(np.linspace(0.0, index[-1], _STEPS + 1), index, s) / s[-1]
-        places[-1] = 1.0
-        return cls(places)
+        positions = np.interp(np.linspace(0.0, index[-1], _STEPS + 1), index, s) / s[-1]
+        positions[-1] = 1.0
+        return cls(positions)
 
     @cached_property
     def _indices(self) -> Array:
-        return np.arange(len(self.places)) / (len(self.places) - 1)
+        return np.arange(len(self.positions)) / (len(self.positions) - 1)
 
 
 def graded(
@@ -80,14 +80,14 @@ def graded(
             f"the coarsest size must be larger than {length / count:g} mm"
         )
     s = np.linspace(0.0, length, STATIONS)
-    away = [rate * np.abs(s - spot.place) for spot in spots]
+    away = [rate * np.abs(s - spot.position) for spot in spots]
 
     def segments(log_finest: float) -> Array:
         """Number of segments (stations,) from the beginning of the line to s."""
         finest = np.exp(log_finest)
-        sizes = [min(spot.size * finest, spot.most) for spot in spots]
-        wanted = [least + more for least, more in zip(sizes, away, strict=True)]
-        size = np.minimum(coarsest, np.min(wanted, axis=0))
+        sizes = [min(spot.size * finest, spot.maximum) for spot in spots]
+        targets = [smallest + more for smallest, more in zip(sizes, away, strict=True)]
+        size = np.minimum(coarsest, np.min(targets, axis=0))
         return np.asarray(cumulative_trapezoid(1.0 / size, s, initial=0))
 
     bounds = np.log(1e-6 * coarsest), np.log(coarsest)

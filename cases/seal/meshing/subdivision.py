@@ -19,25 +19,25 @@ def subdivided(
     sides = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges, which = np.unique(sides, axis=0, return_inverse=True)
     t = np.arange(k + 1)[:, None] / k
-    places = (1 - t) * points[edges[:, :1]] + t * points[edges[:, 1:]]  # (e, k + 1, 2)
+    edge_points = (1 - t) * points[edges[:, :1]] + t * points[edges[:, 1:]]  # (e, k + 1, 2)
     inner = len(points) + np.arange(len(edges) * (k - 1)).reshape(len(edges), k - 1)
     numbers = np.concatenate([edges[:, :1], inner, edges[:, 1:]], axis=1)
     following = np.roll(loop, -1)
     at = _rows(edges, np.sort(np.stack([loop, following], axis=1), axis=1))
     runs = curve[(np.arange(len(loop))[:, None] * k + np.arange(k + 1)) % len(curve)]
     forward = (loop < following)[:, None]
-    places[at] = np.where(forward[..., None], runs, runs[:, ::-1])
+    edge_points[at] = np.where(forward[..., None], runs, runs[:, ::-1])
     border = np.where(forward, numbers[at], numbers[at][:, ::-1])[:, :-1].ravel()
     sides_of = which.reshape(-1, 4)
     turned: Flags = quads > np.roll(quads, -1, axis=1)
-    grid, middle = _grids(numbers, places, sides_of, turned)
+    grid, middle = _grids(numbers, edge_points, sides_of, turned)
     first = len(points) + inner.size
     if k > 1:
         grid[:, 1:-1, 1:-1] = first + np.arange(len(quads) * (k - 1) ** 2).reshape(-1, k - 1, k - 1)
     cells = np.stack([grid[:, :-1, :-1], grid[:, :-1, 1:], grid[:, 1:, 1:], grid[:, 1:, :-1]], -1)
     moved = points.copy()
     moved[loop] = curve[::k]
-    every = np.concatenate([moved, places[:, 1:-1].reshape(-1, 2), middle.reshape(-1, 2)])
+    every = np.concatenate([moved, edge_points[:, 1:-1].reshape(-1, 2), middle.reshape(-1, 2)])
     return every, cells.reshape(-1, 4), border
 
 
@@ -48,13 +48,13 @@ def _rows(table: Integers, rows: Integers) -> Integers:
 
 
 def _grids(
-    numbers: Integers, places: Array, sides: Integers, turned: Flags
+    numbers: Integers, points: Array, sides: Integers, turned: Flags
 ) -> tuple[Integers, Array]:
     """Node numbers (q, k + 1, k + 1), the borders of them set, and inner points (q, (k-1)^2, 2)."""
     q, k = len(sides), numbers.shape[1] - 1
     run = [np.where(turned[:, i, None], numbers[sides[:, i], ::-1], numbers[sides[:, i]])
            for i in range(4)]  # fmt: skip
-    path = [np.where(turned[:, i, None, None], places[sides[:, i], ::-1], places[sides[:, i]])
+    path = [np.where(turned[:, i, None, None], points[sides[:, i], ::-1], points[sides[:, i]])
             for i in range(4)]  # fmt: skip
     grid = np.zeros((q, k + 1, k + 1), dtype=np.int64)
     grid[:, 0], grid[:, :, -1], grid[:, -1], grid[:, :, 0] = (

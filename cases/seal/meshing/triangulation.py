@@ -63,8 +63,8 @@ class _Field:
     def clear(self, at: Array) -> Flags:
         """Which points (n,) are inside and not too close to an edge."""
         away = np.linalg.norm(at[:, None] - self.middles[None], axis=2)
-        apart: Flags = (away > 0.5 * _CLEAR * self.lengths).all(axis=1)
-        return self.inside(at) & apart
+        clear_of_boundary: Flags = (away > 0.5 * _CLEAR * self.lengths).all(axis=1)
+        return self.inside(at) & clear_of_boundary
 
     def inside(self, at: Array) -> Flags:
         """Which points (n,) are inside the polygon."""
@@ -81,8 +81,8 @@ class _Field:
         x = points[triangles]
         area = cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
         triangles[area < 0.0] = triangles[area < 0.0][:, ::-1]
-        kept = self.inside(x.mean(axis=1)) & (np.abs(area) > 1e-14 * np.abs(area).max())
-        return np.asarray(triangles[kept])
+        inside = self.inside(x.mean(axis=1)) & (np.abs(area) > 1e-14 * np.abs(area).max())
+        return np.asarray(triangles[inside])
 
 
 def _circles(x: Array) -> tuple[Array, Array]:
@@ -100,14 +100,14 @@ def _centres_wanted(points: Array, field: _Field) -> Array:
     centres, radii = _circles(x)
     shortest = np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).min(axis=1)
     badness = np.maximum(radii / (_LARGE * field.size(x.mean(axis=1))), radii / (_FLAT * shortest))
-    wanted = (badness > 1.0) & field.clear(centres)
-    centres, radii, badness = centres[wanted], radii[wanted], badness[wanted]
-    taken: list[int] = []
+    requested = (badness > 1.0) & field.clear(centres)
+    centres, radii, badness = centres[requested], radii[requested], badness[requested]
+    selected: list[int] = []
     for k in np.argsort(-badness, kind="stable"):
-        away = np.linalg.norm(centres[taken] - centres[k], axis=1)
+        away = np.linalg.norm(centres[selected] - centres[k], axis=1)
         if (away > radii[k]).all():
-            taken.append(int(k))
-    return np.asarray(centres[taken])
+            selected.append(int(k))
+    return np.asarray(centres[selected])
 
 
 def _relaxed(points: Array, field: _Field) -> Array:
@@ -126,8 +126,8 @@ def _relaxed(points: Array, field: _Field) -> Array:
 def _require_edges(count: int, triangles: Integers) -> None:
     """That every edge of the polygon is a side of one triangle, and nothing else is a border."""
     sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    found = {(int(a), int(b)) for a, b in sides}
-    border = {(a, b) for a, b in found if (b, a) not in found}
+    edges_present = {(int(a), int(b)) for a, b in sides}
+    border = {(a, b) for a, b in edges_present if (b, a) not in edges_present}
     missing = {(k, (k + 1) % count) for k in range(count)} ^ border
     if missing:
         raise MeshError(

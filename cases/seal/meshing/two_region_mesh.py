@@ -38,37 +38,41 @@ def parted_mesh(
     See `outline_mesh` for the others. Raises MeshError.
     """
     assert shape.chord is not None
-    near, far = shape.parts
+    lower, far = shape.parts
     length, width = shape.outline.length, far.pieces[0].length
     begin = (film[0] - shape.chord[0]) % length
-    ends, whole = (begin, begin + (film[1] - film[0]) % length), (0.0, width)
+    bounds, full_width = (begin, begin + (film[1] - film[0]) % length), (0.0, width)
     _, low, _, high = shape.outline.box
-    least = _COARSE * (high - low)
-    outside, inside = Strip(least=least), Strip(1.0, _THICK, least)
-    cap = outline_mesh(Shape(near, ends, ends, CAP), ends, spacing, long, density, outside)
-    cut, count = _cut(BoundaryLayout.of(near, ends, spacing, long, least), near.length)
-    body = outline_mesh(Shape(far, whole, whole, BODY), whole, cut, count, density, inside)
-    places = film[0] - begin, near.length - width, width
-    return _joined(cap, body, places, length)
+    smallest = _COARSE * (high - low)
+    outside, inside = Strip(minimum=smallest), Strip(1.0, _THICK, smallest)
+    cap = outline_mesh(Shape(lower, bounds, bounds, CAP), bounds, spacing, long, density, outside)
+    cut, count = _cut(BoundaryLayout.of(lower, bounds, spacing, long, smallest), lower.length)
+    body = outline_mesh(
+        Shape(far, full_width, full_width, BODY), full_width, cut, count, density, inside
+    )
+    positions = film[0] - begin, lower.length - width, width
+    return _joined(cap, body, positions, length)
 
 
 def _cut(layout: BoundaryLayout, length: float) -> tuple[Spacing, int]:
     """Spacing of the nodes along the cut, the other way, and their segments at density 1."""
     for _, end, spacing, count in layout.parts:
         if spacing is not None and isclose(end, length):
-            return Spacing(1.0 - spacing.places[::-1]), count
+            return Spacing(1.0 - spacing.positions[::-1]), count
     raise MeshError("no corners where a cut meets the outline")
 
 
 def _joined(
-    cap: SectionMesh, body: SectionMesh, places: tuple[float, float, float], length: float
+    cap: SectionMesh, body: SectionMesh, positions: tuple[float, float, float], length: float
 ) -> SectionMesh:
     """Both in one, on an outline of this length.
 
-    places: on it where the cap begins; lengths of the cap's part of it and of the cut.
+    positions: on it where the cap begins; lengths of the cap's part of it and of the cut.
     """
-    start, beside, width = places
-    first, last = (int(np.argmin(np.abs(cap.places - at))) for at in (beside, beside + width))
+    start, side_length, width = positions
+    first, last = (
+        int(np.argmin(np.abs(cap.positions - at))) for at in (side_length, side_length + width)
+    )
     cut, outer = body.boundary[: body.arc + 1], body.boundary[body.arc + 1 :]
     numbers = np.full(len(body.points), -1, dtype=np.int64)
     numbers[cut] = cap.boundary[first : last + 1][::-1]
@@ -76,9 +80,9 @@ def _joined(
     numbers[free] = len(cap.points) + np.arange(int(free.sum()))
     boundary = [cap.boundary[: first + 1], numbers[outer], cap.boundary[last:]]
     around = [
-        cap.places[: first + 1] + start,
-        body.places[body.arc + 1 :] - width + beside + start,
-        cap.places[last:] - beside - width + length + start,
+        cap.positions[: first + 1] + start,
+        body.positions[body.arc + 1 :] - width + side_length + start,
+        cap.positions[last:] - side_length - width + length + start,
     ]
     cells = len(cap.quads)
     return SectionMesh(

@@ -15,7 +15,7 @@ from softehl.cases.harness.report.part import FinishedRun
 from softehl.cases.harness.report.plot import COLOURS, plot, put_legend_above
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.report import style
-from softehl.cases.seal.report.profiles import places, thicknesses
+from softehl.cases.seal.report.profiles import position_range, thicknesses
 from softehl.cases.seal.states.observer_adapter import read_profile
 from softehl.cases.seal.states.state import FilmRow
 
@@ -31,13 +31,13 @@ def film_plot(run: FinishedRun) -> Any:
     """Pressure and film thickness of both strokes, at the speed that a slider chooses."""
     speeds = sorted({abs(r.rod_speed_mm_s) for r in run.rows}, reverse=True)
     top = max(r.p_max_MPa for r in run.rows)
-    size: dict[str, Any] = {"width": 460, "height": 300, "x_range": places(run.rows)}
+    size: dict[str, Any] = {"width": 460, "height": 300, "x_range": position_range(run.rows)}
     pressure = plot(style.POSITION, style.PRESSURE, y_range=(-0.05 * top, 1.1 * top), **size)
     logarithmic: dict[str, Any] = {"y_range": thicknesses(run.rows), "y_axis_type": "log"}
     film = plot(style.POSITION, style.FILM, **logarithmic, **size)
-    pairs, known = [], {r.key: r for r in run.rows}
+    pairs, rows_by_speed = [], {r.key: r for r in run.rows}
     for stroke, sign in (("out", 1.0), ("in", -1.0)):
-        states = [_line(run, known.get(sign * speed)) for speed in speeds]
+        states = [_line(run, rows_by_speed.get(sign * speed)) for speed in speeds]
         if not any(state["x"] for state in states):
             continue
         source = ColumnDataSource(states[0], name=f"film {stroke}")

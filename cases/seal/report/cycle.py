@@ -40,11 +40,11 @@ def loop_figure(loops: Mapping[str, Columns], work: Sequence[float]) -> Figure:
     """
     figure = Figure(figsize=(5.4, 3.6))
     axes = figure.subplots()
-    shades, begun = np.linspace(0.25, 1.0, len(loops) + 1)[1:], np.empty((2, 0))
+    shades, last_point = np.linspace(0.25, 1.0, len(loops) + 1)[1:], np.empty((2, 0))
     for shade, energy, (label, loop) in zip(shades, work, loops.items(), strict=True):
-        line = np.hstack([begun, [loop["place_mm"], loop["friction_N"]]])
+        line = np.hstack([last_point, [loop["place_mm"], loop["friction_N"]]])
         axes.plot(*line, color="#1b6ca8", alpha=shade, label=f"{label}: {energy:.4g} mJ")
-        begun = line[:, -1:]
+        last_point = line[:, -1:]
     axes.axhline(0.0, color="0.4", linewidth=0.7)
     axes.set(xlabel=_PLACE, ylabel=style.FRICTION)
     axes.legend(title="work of a cycle")
@@ -69,9 +69,9 @@ def map_figure(film: Columns, loop: Columns) -> Figure:
     speed.plot(loop["rod_speed_mm_s"], loop["t_s"], color="#1b6ca8")
     speed.axvline(0.0, color="0.4", linewidth=0.7)
     speed.set(xlabel="$U$ [mm/s]", ylabel="$t$ [s]")
-    shown = np.clip(h, max(float(h.min()), 1e-3), _THICKEST)
+    thickness = np.clip(h, max(float(h.min()), 1e-3), _THICKEST)
     colours = axes.pcolormesh(
-        x, times, shown, norm=LogNorm(), shading="gouraud", cmap="viridis", rasterized=True
+        x, times, thickness, norm=LogNorm(), shading="gouraud", cmap="viridis", rasterized=True
     )
     axes.set(xlabel=style.POSITION, xlim=_wetted(x, h))
     axes.grid(visible=False)
@@ -92,12 +92,12 @@ def moving_section(
     draw_gland(axes, p)
     ring = Polygon(points[0], facecolor="#f0b86a", edgecolor="#3b3f45", linewidth=0.9)
     axes.add_patch(ring)
-    apart = 0.6 * p.section_diameter
+    spacing = 0.6 * p.section_diameter
     (marks,) = axes.plot([], [], color="#3b3f45", linestyle="", marker=TICKDOWN, markersize=6)
 
-    def show(t: float, place: float) -> tuple[Polygon, Line2D]:
+    def show(t: float, position: float) -> tuple[Polygon, Line2D]:
         ring.set_xy(points[int(np.argmin(abs(times - t)))])
-        z = place % apart + apart * np.arange(-8.0, 8.0)
+        z = position % spacing + spacing * np.arange(-8.0, 8.0)
         marks.set_data(z, np.full_like(z, 0.5 * p.rod_diameter))
         return ring, marks
 
@@ -111,18 +111,18 @@ def write_animation(path: Path, p: Seal, film: Columns, loop: Columns, outline: 
     """
     times, x, h, pressures = film_map(film)
     figure = Figure(figsize=(5.0, 7.4), dpi=80)
-    gland, pressure, thickness, place = figure.subplots(4, 1, height_ratios=(4.5, 3, 3, 1))
+    gland, pressure, thickness, loop_axes = figure.subplots(4, 1, height_ratios=(4.5, 3, 3, 1))
     move = moving_section(gland, p, outline)
     gland.set(xlabel="$z$ [mm]", ylabel="$r$ [mm]")
-    limits, most = _wetted(x, h), float(pressures.max())
+    limits, maximum = _wetted(x, h), float(pressures.max())
     (line_p,) = pressure.plot(x, pressures[0], color="#c8553d")
-    pressure.set(ylabel="$p$ [MPa]", xlim=limits, ylim=(-0.05 * most, 1.1 * most))
+    pressure.set(ylabel="$p$ [MPa]", xlim=limits, ylim=(-0.05 * maximum, 1.1 * maximum))
     (line_h,) = thickness.semilogy(x, h[0], color="#1b6ca8")
     low = max(0.7 * float(h.min()), 1e-3)
     thickness.set(ylabel="$h$ [µm]", xlabel="$x$ [mm]", xlim=limits, ylim=(low, _THICKEST))
-    place.plot(loop["place_mm"], loop["friction_N"], color="0.7", linewidth=1.0)
-    (dot,) = place.plot([], [], color="#1b6ca8", marker="o")
-    place.set(xlabel=_PLACE, ylabel="$F$ [N]")
+    loop_axes.plot(loop["place_mm"], loop["friction_N"], color="0.7", linewidth=1.0)
+    (dot,) = loop_axes.plot([], [], color="#1b6ca8", marker="o")
+    loop_axes.set(xlabel=_PLACE, ylabel="$F$ [N]")
 
     def show(t: float) -> None:
         at = int(np.argmin(abs(times - t)))
@@ -146,14 +146,14 @@ def _frames(
     for artist in moving:
         artist.set_animated(True)
     canvas.draw()
-    still, found = canvas.copy_from_bbox(figure.bbox), []
+    background, frames = canvas.copy_from_bbox(figure.bbox), []
     for t in moments.tolist():
         show(t)
-        canvas.restore_region(still)
+        canvas.restore_region(background)
         for artist in moving:
             figure.draw_artist(artist)
-        found.append(fromarray(np.array(canvas.buffer_rgba())).convert("RGB"))
-    return found
+        frames.append(fromarray(np.array(canvas.buffer_rgba())).convert("RGB"))
+    return frames
 
 
 def _wetted(x: Array, h: Array) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from softehl.cases.harness.case import AnyCase
-from softehl.cases.harness.report.page import all_keys, asked, left_out
+from softehl.cases.harness.report.page import all_keys, input_part, left_out
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
 from softehl.cases.harness.report.plot import plot, put_legend_above
 from softehl.cases.harness.responses import titled
@@ -25,37 +25,37 @@ from softehl.cases.seal.states.state import FilmRow
 def design_title(design: Design, run: str) -> str:
     """The seal, the key and the target; run: the title of a run of the seal."""
     change = f"{design.target.percent:+g}\N{NO-BREAK SPACE}%"
-    return f"{run.partition(': ')[0]}: {design.by.words} for {design.target.words} {change}"
+    return f"{run.partition(': ')[0]}: {design.by.title} for {design.target.title} {change}"
 
 
 def design_parts(design: Design, case: AnyCase) -> list[Part]:
     """Answer, curve of the design, results before and after, gland, section, keys, limits."""
-    before, after = (
+    previous, after = (
         FinishedRun(Path(name), case, p, [], content={"status": "converged"})
         for name, p in (("before", design.parameters), ("after", design.met))
     )
-    films = dict(zip((before.name, after.name), (design.films[0], design.films[-1]), strict=True))
+    films = dict(zip((previous.name, after.name), (design.films[0], design.films[-1]), strict=True))
 
     def section(run: FinishedRun) -> Figure:
         value, film = films[run.name]
         view = View(FilmRow.part_of(film), film.profile, film.section)
         return section_figure(design.at(value), [view])
 
-    runs = [before, after]
+    runs = [previous, after]
     sections = Part("Deformed section", PRESSURES, pictures_of(runs, section))
-    found = [_answer(design), _curve(design), _both(design), gland(runs), sections]
-    return [*found, asked(runs), *left_out(case), all_keys(runs)]
+    parts = [_summary(design), _curve(design), _both(design), gland(runs), sections]
+    return [*parts, input_part(runs), *left_out(case), all_keys(runs)]
 
 
-def _answer(design: Design) -> Part:
+def _summary(design: Design) -> Part:
     p, first, last = design.parameters, design.steps[0], design.steps[-1]
-    before, after = (design.measure(step.value) for step in (first, last))
+    previous, after = (design.measure(step.value) for step in (first, last))
     by, target, unit = design.by, design.target, f" {design.by.unit}".rstrip()
     return Part(
         "Answer",
         lines=[
-            f"{by.words} {after:.5g}{unit} instead of {before:.5g}{unit}: "
-            f"{target.words} {last.quantity:.4g} {target.unit} instead of {first.quantity:.4g} "
+            f"{by.title} {after:.5g}{unit} instead of {previous:.5g}{unit}: "
+            f"{target.title} {last.quantity:.4g} {target.unit} instead of {first.quantity:.4g} "
             f"{target.unit}, {design.change:+.2f} % (wanted {target.percent:+g} %)",
             _rate(design),
             f"this is the {style.STROKES[p.stroke]} at {p.speeds[0]:g} mm/s and "
@@ -67,12 +67,14 @@ def _answer(design: Design) -> Part:
 
 def _rate(design: Design) -> str:
     """The change of the quantity with a step of the key that a workshop thinks in."""
-    by, target, value, near = design.by, design.target, design.steps[-1].value, 1e-6
+    by, target, value, step_size = design.by, design.target, design.steps[-1].value, 1e-6
     measure, slope = design.measure(value), slope_of(design.films[-1][1], target.quantity, by.key)
     step = {"mm": 0.01, "%": 1.0}.get(by.unit, 0.01 * abs(measure))
-    percent = 100.0 * slope * near * step / (design.measure(value * (1.0 + near)) - measure)
+    percent = (
+        100.0 * slope * step_size * step / (design.measure(value * (1.0 + step_size)) - measure)
+    )
     unit = f" {by.unit}".rstrip()
-    return f"{step:.3g}{unit} more {by.words} there: {target.words} {percent:+.2g} %"
+    return f"{step:.3g}{unit} more {by.title} there: {target.title} {percent:+.2g} %"
 
 
 def _curve(design: Design) -> Part:
@@ -86,8 +88,8 @@ def _curve(design: Design) -> Part:
         )
         for number, step in enumerate(design.steps, 1)
     ]
-    key = titled(design.by.words, design.by.unit)
-    quantity = titled(design.target.words, design.target.unit)
+    key = titled(design.by.title, design.by.unit)
+    quantity = titled(design.target.title, design.target.unit)
     text = (
         "Each mark is a nonlinear solve; the line is what the sensitivities of the first one "
         "predict; the full mark meets the target."
@@ -103,11 +105,11 @@ def _draw(panel: Any, design: Design) -> None:
     slope = slope_of(design.films[0][1], design.target.quantity, design.by.key)
     between = np.linspace(min(values), max(values), 41)
     predicted = first.quantity * (between / first.value) ** slope
-    colour, wanted = style.COLOURS["out"], design.target.factor * first.quantity
+    colour, target = style.COLOURS["out"], design.target.factor * first.quantity
     along = [design.measure(value) for value in between.tolist()]
     panel.line(along, predicted, color=colour, legend_label="first prediction")
     dashes: dict[str, Any] = {"color": style.COLOURS["in"], "line_dash": "dashed"}
-    panel.line([along[0], along[-1]], [wanted, wanted], **dashes, legend_label="target")
+    panel.line([along[0], along[-1]], [target, target], **dashes, legend_label="target")
     x, y = [design.measure(value) for value in values], [step.quantity for step in design.steps]
     marks: dict[str, Any] = {"size": 9, "line_color": colour}
     panel.scatter(x[:-1], y[:-1], fill_color="white", **marks, legend_label="solved")
@@ -118,11 +120,11 @@ def _draw(panel: Any, design: Design) -> None:
 def _both(design: Design) -> Part:
     """All results with the first value of the key and with the last one."""
     (_, first), (at, last) = design.films[0], design.films[-1]
-    way, rows = design.steps[-1].value / at, []
-    for name, (words, unit) in CALLED.items():
-        before = value_of(first, name)
-        after = value_of(last, name) * way ** slope_of(last, name, design.by.key)
-        rows.append((words, before, after, f"{100.0 * (after / before - 1.0):+.3g} %", unit))
+    ratio, rows = design.steps[-1].value / at, []
+    for name, (title, unit) in CALLED.items():
+        previous = value_of(first, name)
+        after = value_of(last, name) * ratio ** slope_of(last, name, design.by.key)
+        rows.append((title, previous, after, f"{100.0 * (after / previous - 1.0):+.3g} %", unit))
     header = ("", "before", "after", "change", "unit")
     text = "Also what was not asked for changes; leakage of the stroke is not that of a cycle."
     return Part("Before and after", text, tables=[Table("Results of this film", header, rows)])

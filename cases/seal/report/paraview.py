@@ -57,9 +57,9 @@ def gland_lines(p: Gland, clearance: float = 0.0) -> tuple[Array, Array, Array]:
         angles = np.linspace(0.0, 0.5 * pi, 17)
         around = 1.0 - np.stack([np.cos(angles), np.sin(angles)], axis=1)
         edge = [end, rod + p.extrusion_gap] + p.corner_fillet * around
-    beside = [[left, lip], [left, top], [right, top], [right, edge[-1, 1]]]
+    outline = [[left, lip], [left, top], [right, top], [right, edge[-1, 1]]]
     return (
         np.array([[left, rod], [right, rod]]),
         np.concatenate([foot, [[start, housing], [end, housing]], edge]),
-        np.concatenate([foot, beside, edge[-1:]]),
+        np.concatenate([foot, outline, edge[-1:]]),
     )

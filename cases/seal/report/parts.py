@@ -47,8 +47,8 @@ def cycle_parts(runs: Sequence[FinishedRun]) -> list[Part]:
     ]
     text = "A cycle is periodic where it differs from the one before by less than 1 %."
     tables = [Table("Every cycle", ["run", *heads, "verdict"], rows)]
-    shown = {"friction_loop": "Friction loop", "film_map": "Film over time and place"}
-    pictures = (Part(title, pictures=_drawn(runs, name)) for name, title in shown.items())
+    titles = {"friction_loop": "Friction loop", "film_map": "Film over time and place"}
+    pictures = (Part(title, pictures=_drawn(runs, name)) for name, title in titles.items())
     return [Part("Cycles", text, tables=tables), *(p for p in pictures if p.pictures), gland(runs)]
 
 
@@ -84,7 +84,7 @@ def gland(runs: Sequence[FinishedRun]) -> Part:
     pictures = pictures_of(runs, lambda run: gland_figure(run.parameters))
     numbers = [fit_numbers(run.parameters) for run in runs]
     rows: list[tuple[Cell, ...]] = [
-        (name, *(found[name][0] for found in numbers), unit)
+        (name, *(numbers_of_run[name][0] for numbers_of_run in numbers), unit)
         for name, (_, unit) in numbers[0].items()
     ]
     force = (runs[0].content.get("numbers") or {}).get("air_wall_N")
@@ -182,8 +182,8 @@ def tolerances(runs: Sequence[FinishedRun]) -> Part:
             for key, value, tolerance in ring_sizes(p.ring)
         ]
         rows += [
-            (run.name, f"{name} = {found.nominal:g} mm", f"{found.low:g} to {found.high:g} mm")
-            for name, _, found in bands(p.said, piston=p.piston)
+            (run.name, f"{name} = {band.nominal:g} mm", f"{band.low:g} to {band.high:g} mm")
+            for name, _, band in bands(p.said, piston=p.piston)
         ]
         if p.shore_A is not None:
             low, high = shore_band(p.shore_A, p.polymer)
@@ -200,14 +200,14 @@ def tolerances(runs: Sequence[FinishedRun]) -> Part:
 
 def _bands(run: FinishedRun) -> list[Table]:
     """Bands of the results by the tolerances, if the run has sensitivities."""
-    found = ToleranceRow.read(run.folder / "tolerances.csv")
+    rows_read = ToleranceRow.read(run.folder / "tolerances.csv")
     header = ("", "rod speed U [mm/s]", "likely change [%]", "at worst [%]", "most of it by")
     rows = [
         (
             *(CALLED[row.quantity][0], row.rod_speed_mm_s, row.likely_percent, row.worst_percent),
             f"{row.largest.replace('_', ' ')}, {row.largest_percent:.3g} %",
         )
-        for row in found
+        for row in rows_read
     ]
     return [Table(f"{run.name}: changes that follow", header, rows)] if rows else []
 

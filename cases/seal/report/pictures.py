@@ -56,12 +56,12 @@ def curve_figure(head: str, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]
 def _draw_lines(axes: Axes, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]) -> None:
     axes.set(xscale="log", yscale="log", xlabel=style.SPEED)
     axes.margins(x=0.07)
-    for stroke, chosen in style.by_stroke(rows).items():
-        _draw_film_curve(axes, stroke, chosen)
+    for stroke, selected in style.by_stroke(rows).items():
+        _draw_film_curve(axes, stroke, selected)
     _draw_slope(axes, rows)
-    for stroke, chosen in style.by_stroke(rejected).items():  # crosses on the lower axis
+    for stroke, selected in style.by_stroke(rejected).items():  # crosses on the lower axis
         axes.plot(
-            *([abs(row.rod_speed_mm_s) for row in chosen], [0.02] * len(chosen), "x"),
+            *([abs(row.rod_speed_mm_s) for row in selected], [0.02] * len(selected), "x"),
             color=style.COLOURS[stroke],
             transform=axes.get_xaxis_transform(),
             label=f"{style.STROKES[stroke]}, film collapsed: no result",
@@ -93,10 +93,10 @@ _COLLAPSED = "film collapsed:\nno result"
 
 
 def _bar_label(row: FilmRow) -> str:
-    words = [f"{row.h_star_um:.4g} µm"]
+    lines = [f"{row.h_star_um:.4g} µm"]
     if np.isfinite(row.h_star_error_percent):
-        words.append(f"± {abs(row.h_star_error_percent):.2g} %")
-    return "\n".join(words if row.verdict == OK else [*words, row.verdict])
+        lines.append(f"± {abs(row.h_star_error_percent):.2g} %")
+    return "\n".join(lines if row.verdict == OK else [*lines, row.verdict])
 
 
 def fitted_exponent(rows: Sequence[FilmRow]) -> float | None:
@@ -105,8 +105,8 @@ def fitted_exponent(rows: Sequence[FilmRow]) -> float | None:
     Only states that are ok count. None where no stroke has two of them.
     """
     products = squares = 0.0
-    for chosen in style.by_stroke(row for row in rows if row.verdict == OK).values():
-        x, y = np.log(_film_columns(chosen)[:2])
+    for selected in style.by_stroke(row for row in rows if row.verdict == OK).values():
+        x, y = np.log(_film_columns(selected)[:2])
         products += float((x - x.mean()) @ (y - y.mean()))
         squares += float((x - x.mean()) @ (x - x.mean()))
     return products / squares if squares else None
@@ -115,9 +115,9 @@ def fitted_exponent(rows: Sequence[FilmRow]) -> float | None:
 def _draw_film_curve(axes: Axes, stroke: str, rows: Sequence[FilmRow]) -> None:
     """A line with the bars of the estimated error; hollow markers with a word where not ok."""
     label, colour = style.STROKES[stroke], style.COLOURS[stroke]
-    known = [row for row in rows if np.isfinite(row.h_star_error_percent)]
-    if known:
-        speed, film, error = _film_columns(known)
+    finite = [row for row in rows if np.isfinite(row.h_star_error_percent)]
+    if finite:
+        speed, film, error = _film_columns(finite)
         label += f" (error bars: at most {error.max():.2g} %)"
         axes.errorbar(speed, film, 0.01 * error * film, color=colour, fmt="none", capsize=3)
     speed, film, _ = _film_columns(rows)
@@ -125,10 +125,10 @@ def _draw_film_curve(axes: Axes, stroke: str, rows: Sequence[FilmRow]) -> None:
     for row in rows:
         if row.verdict == OK:
             continue
-        place = abs(row.rod_speed_mm_s), row.h_star_um
-        axes.plot(*place, style.MARKERS[stroke], color=colour, markerfacecolor="white")
+        position = abs(row.rod_speed_mm_s), row.h_star_um
+        axes.plot(*position, style.MARKERS[stroke], color=colour, markerfacecolor="white")
         shift = (-5, 4) if stroke == "out" else (5, -4)
-        style.write_beside(axes, place, row.verdict, shift, color=colour)
+        style.write_beside(axes, position, row.verdict, shift, color=colour)
 
 
 def _draw_slope(axes: Axes, rows: Sequence[FilmRow]) -> None:
@@ -137,9 +137,11 @@ def _draw_slope(axes: Axes, rows: Sequence[FilmRow]) -> None:
     if exponent is None:
         return
     speed, film, _ = _film_columns(rows)
-    ends = speed[[0, -1]]
-    line = 1.2 * float((film / speed**exponent).max()) * ends**exponent
-    axes.plot(ends, line, "--", color="0.45", linewidth=1.0, label=f"slope {exponent:.3f} (fitted)")
+    ends_speed = speed[[0, -1]]
+    line = 1.2 * float((film / speed**exponent).max()) * ends_speed**exponent
+    axes.plot(
+        ends_speed, line, "--", color="0.45", linewidth=1.0, label=f"slope {exponent:.3f} (fitted)"
+    )
 
 
 def _film_columns(rows: Sequence[FilmRow]) -> Array:
@@ -148,29 +150,31 @@ def _film_columns(rows: Sequence[FilmRow]) -> Array:
     return np.abs([[getattr(row, name) for row in rows] for name in names])
 
 
-def tornado_figure(head: str, slopes: Slopes) -> Figure:
+def tornado_figure(head: str, log_derivatives: Slopes) -> Figure:
     """Bars: per cent of each quantity for one per cent of a key, at the slowest speeds.
 
     Of each quantity the ten keys that matter most.
     """
-    fast_first = sorted((speed for speed, _ in slopes), key=abs, reverse=True)
+    fast_first = sorted((speed for speed, _ in log_derivatives), key=abs, reverse=True)
     slowest = {"out" if u > 0.0 else "in": u for u in fast_first}
     bars = [(stroke, slowest[stroke]) for stroke in style.STROKES if stroke in slowest]
     figure = Figure(figsize=(3.3 * len(SHOWN) + 1.2, 4.2))
     panels = figure.subplots(1, len(SHOWN))
     for axes, quantity in zip(panels, SHOWN, strict=True):
-        found = [slopes[u, quantity] for _, u in bars]
-        names = sorted(found[0], key=lambda name: max(abs(s[name]) for s in found))[-10:]
-        places, height = np.arange(len(names)), 0.8 / len(bars)
-        for k, ((stroke, u), values) in enumerate(zip(bars, found, strict=True)):
+        values_by_stroke = [log_derivatives[u, quantity] for _, u in bars]
+        names = sorted(
+            values_by_stroke[0], key=lambda name: max(abs(s[name]) for s in values_by_stroke)
+        )[-10:]
+        positions, height = np.arange(len(names)), 0.8 / len(bars)
+        for k, ((stroke, u), values) in enumerate(zip(bars, values_by_stroke, strict=True)):
             axes.barh(
-                places + height * (0.5 * (len(bars) - 1) - k),
+                positions + height * (0.5 * (len(bars) - 1) - k),
                 [values[name] for name in names],
                 height,
                 color=style.COLOURS[stroke],
                 label=f"{style.STROKES[stroke]} {abs(u):g} mm/s",
             )
-        axes.set_yticks(places, [name.replace("_", " ") for name in names])
+        axes.set_yticks(positions, [name.replace("_", " ") for name in names])
         axes.set_xscale("symlog", linthresh=0.1)
         axes.set_xticks([-10, -1, 0, 1, 10], ["-10", "-1", "0", "1", "10"])
         axes.minorticks_off()
@@ -200,8 +204,8 @@ def crossing(p: Oil, rows: Sequence[FilmRow], ratio: float) -> float | None:
     for below, above in pairwise(rows):
         ratios = below.lambda_ratio, above.lambda_ratio
         if ratios[0] < ratio <= ratios[1]:
-            ends = np.log([hersey_um(p, below), hersey_um(p, above)])
-            return float(np.exp(np.interp(np.log(ratio), np.log(ratios), ends)))
+            log_bounds = np.log([hersey_um(p, below), hersey_um(p, above)])
+            return float(np.exp(np.interp(np.log(ratio), np.log(ratios), log_bounds)))
     return None
 
 
@@ -211,14 +215,14 @@ def stribeck_figure(p: Seal, rows: Sequence[FilmRow]) -> Figure | None:
     if len({abs(row.rod_speed_mm_s) for row in rough}) < 2:
         return None
     figure = Figure(figsize=(5.4, 5.6))
-    friction, shares = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
-    for stroke, chosen in style.by_stroke(rough).items():
-        _draw_friction(p, friction, shares, stroke, chosen)
+    friction, fractions = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+    for stroke, selected in style.by_stroke(rough).items():
+        _draw_friction(p, friction, fractions, stroke, selected)
     friction.set(xscale="log", yscale="log", ylabel=style.FRICTION)
-    shares.set(ylim=(-4.0, 104.0), ylabel="asperities [%]", xlabel=_HERSEY)
+    fractions.set(ylim=(-4.0, 104.0), ylabel="asperities [%]", xlabel=_HERSEY)
     style.tick_plainly(friction.yaxis)
     friction.legend(loc="lower left")
-    shares.legend(loc="best", title="share of load (line), of friction (dashes)")
+    fractions.legend(loc="best", title="share of load (line), of friction (dashes)")
     speed = 1e3 * p.viscosity / rows[0].contact_p_max_MPa
     above = friction.secondary_xaxis("top", functions=(lambda x: x / speed, lambda u: u * speed))
     above.set_xlabel(style.SPEED)
@@ -228,22 +232,22 @@ def stribeck_figure(p: Seal, rows: Sequence[FilmRow]) -> Figure | None:
 
 
 def _draw_friction(
-    p: Oil, friction: Axes, shares: Axes, stroke: str, rows: Sequence[FilmRow]
+    p: Oil, friction: Axes, fractions: Axes, stroke: str, rows: Sequence[FilmRow]
 ) -> None:
     x = [hersey_um(p, row) for row in rows]
     colour, label = style.COLOURS[stroke], style.STROKES[stroke]
     forces = [abs(row.rod_friction_N) for row in rows]
     friction.plot(x, forces, color=colour, marker=style.MARKERS[stroke], label=label)
-    shares.plot(x, [row.asperity_load_percent for row in rows], color=colour, label=label)
-    shares.plot(x, [row.boundary_friction_percent for row in rows], "--", color=colour)
+    fractions.plot(x, [row.asperity_load_percent for row in rows], color=colour, label=label)
+    fractions.plot(x, [row.boundary_friction_percent for row in rows], "--", color=colour)
     for ratio, words in _REGIMES.items():
-        place = crossing(p, rows, ratio)
-        if place is None:
+        position = crossing(p, rows, ratio)
+        if position is None:
             continue
-        for axes in (friction, shares):
-            axes.axvline(place, color=colour, linestyle=":", linewidth=1.0)
+        for axes in (friction, fractions):
+            axes.axvline(position, color=colour, linestyle=":", linewidth=1.0)
         friction.text(
-            *(place, 0.98, f"{words} "),
+            *(position, 0.98, f"{words} "),
             transform=friction.get_xaxis_transform(),
             rotation=90,
             ha="right" if stroke == "out" else "left",
@@ -256,19 +260,19 @@ def _draw_friction(
 _TEST_COLOURS = dict(zip(SECOND, ("#1b6ca8", "#c8553d", "#4f8a52"), strict=True))
 
 
-def fit_figure(found: Fit) -> Figure:
+def fit_figure(result: Fit) -> Figure:
     """Tests as marks, the material that was fitted to them as lines."""
     figure = Figure(figsize=(5.4, 4.0))
     axes = figure.subplots()
-    material, data = MATERIALS[found.material], found.data
-    values = material.kernel_values(found.values)
+    material, data = MATERIALS[result.material], result.data
+    values = material.kernel_values(result.values)
     for test in dict.fromkeys(data.test.tolist()):
-        chosen, colour = data.part(data.test == test), _TEST_COLOURS[test]
-        axes.plot(chosen.stretch, chosen.stress, "o", color=colour, markersize=3.5, label=test)
-        stretch = np.linspace(min(1.0, chosen.stretch.min()), chosen.stretch.max(), 200)
+        selected, colour = data.part(data.test == test), _TEST_COLOURS[test]
+        axes.plot(selected.stretch, selected.stress, "o", color=colour, markersize=3.5, label=test)
+        stretch = np.linspace(min(1.0, selected.stretch.min()), selected.stretch.max(), 200)
         stress = nominal_stress(material, values, strains(test, stretch), stretch)
         axes.plot(stretch, stress, color=colour, linewidth=1.1)
-    label = f"{found.material}: error {found.error:.3g} MPa, $R^2$ = {found.quality:.4f}"
+    label = f"{result.material}: error {result.error:.3g} MPa, $R^2$ = {result.quality:.4f}"
     axes.plot([], [], color="0.3", label=label)
     axes.set(xlabel="stretch", ylabel="nominal stress [MPa]")
     axes.legend()
@@ -284,15 +288,17 @@ Raises OSError, and ValueError where a file cannot be read back.
 
 def _fit(run: FinishedRun) -> Figure | None:
     try:
-        found = fit_of(run.parameters)
+        result = fit_of(run.parameters)
     except ValueError:
         return None  # the table of tests is elsewhere now
-    return fit_figure(found) if found else None
+    return fit_figure(result) if result else None
 
 
 def _tornado(run: FinishedRun) -> Figure | None:
-    slopes = read_slopes(run.parameters, run.folder)
-    return tornado_figure(style.subject(run.parameters), slopes) if slopes else None
+    log_derivatives = read_slopes(run.parameters, run.folder)
+    return (
+        tornado_figure(style.subject(run.parameters), log_derivatives) if log_derivatives else None
+    )
 
 
 def _section(run: FinishedRun) -> Figure | None:
@@ -328,11 +334,11 @@ def pictures_of(
 ) -> list[Picture]:
     """Pictures for a page, of the runs that have something to show."""
     with style.drawing():
-        found = [(caption(run), draw(run)) for run in runs]
-        return [Picture(words, _png(figure)) for words, figure in found if figure]
+        figures = [(caption(run), draw(run)) for run in runs]
+        return [Picture(title, _png(figure)) for title, figure in figures if figure]
 
 
 def _png(figure: Figure) -> bytes:
-    found = BytesIO()
-    figure.savefig(found, format="png", dpi=130)
-    return found.getvalue()
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=130)
+    return buffer.getvalue()

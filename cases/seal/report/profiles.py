@@ -43,7 +43,7 @@ def profiles_figure(head: str, results: Results) -> Figure:
         film.set_xlabel(style.POSITION)
     pressure, film = axes[:, 0]
     pressure.set_ylabel(style.PRESSURE)
-    film.set(ylabel=style.FILM, xlim=places(rows), yscale="log")
+    film.set(ylabel=style.FILM, xlim=position_range(rows), yscale="log")
     low, high = thicknesses(rows)
     if 0 < low < high:
         film.set_ylim(low, high)
@@ -53,11 +53,11 @@ def profiles_figure(head: str, results: Results) -> Figure:
     return figure
 
 
-def places(rows: Sequence[FilmRow]) -> tuple[float, float]:
+def position_range(rows: Sequence[FilmRow]) -> tuple[float, float]:
     """Range of x around the contacts of all states, mm."""
-    known = [row for row in rows if np.isfinite(row.contact_start_mm)]
-    start = min((row.contact_start_mm for row in known), default=-1.0)
-    end = max((row.contact_end_mm for row in known), default=1.0)
+    finite = [row for row in rows if np.isfinite(row.contact_start_mm)]
+    start = min((row.contact_start_mm for row in finite), default=-1.0)
+    end = max((row.contact_end_mm for row in finite), default=1.0)
     return start - 0.3, end + 0.3
 
 

@@ -84,31 +84,31 @@ def section_figure(p: Seal, views: Sequence[View]) -> Figure:
     scale, figure = Scale.of(p, views), Figure((3.3 * len(views) + 1.5, 4.2), layout="compressed")
     panels = figure.subplots(1, len(views), sharey=True, squeeze=False)[0]
     for axes, view in zip(panels, views, strict=True):
-        shown = draw_view(axes, p, view, scale)
+        contours = draw_view(axes, p, view, scale)
         speed = f"{view.row.rod_speed_mm_s:+g}".replace("-", "\N{MINUS SIGN}")
         film = f"U = {speed} mm/s, h* = {view.row.h_star_um:.3g} µm"
         axes.set_title(f"{style.STROKES[view.row.stroke]}, {film}")
         axes.set_xlabel("z [mm]")
     style.radial_axis(panels[0], p)
-    write_colours(figure, panels[-1], shown)
+    write_colours(figure, panels[-1], contours)
     style.write_head(figure, style.subject(p))
     return figure
 
 
-def write_colours(figure: Figure, axes: Axes, shown: TriContourSet) -> None:
+def write_colours(figure: Figure, axes: Axes, contours: TriContourSet) -> None:
     """The colours of the stress beside a panel, as high as it."""
-    beside = axes.inset_axes((1.04, 0.0, 0.04, 1.0))
-    figure.colorbar(shown, cax=beside, label="von Mises stress [MPa]")
+    colour_axes = axes.inset_axes((1.04, 0.0, 0.04, 1.0))
+    figure.colorbar(contours, cax=colour_axes, label="von Mises stress [MPa]")
 
 
 def draw_view(axes: Axes, p: Seal, view: View, scale: Scale) -> TriContourSet:
     """One state in its gland; what a colour bar needs."""
     draw_gland(axes, p, 0.5 * (view.row.contact_start_mm + view.row.contact_end_mm))
-    shown = _draw_ring(axes, view.section, scale.levels)
+    contours = _draw_ring(axes, view.section, scale.levels)
     _draw_film(axes, p, view.profile, scale.height)
     _draw_contact(axes, p, view.section, scale.height)
     _draw_motion(axes, p, view.row.rod_speed_mm_s)
-    return shown
+    return contours
 
 
 def draw_gland(axes: Axes, p: Seal, middle: float | None = None) -> None:
@@ -118,7 +118,7 @@ def draw_gland(axes: Axes, p: Seal, middle: float | None = None) -> None:
     rod and hides the end of the fluid, mm; that of the groove.
     """
     size, rod, housing = p.section_diameter, 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
-    line, groove, beside = gland_lines(p, clearance=0.06 * size)
+    line, groove, wall = gland_lines(p, clearance=0.06 * size)
     around = _AROUND * size
     if p.sealed_pressure:
         edge = p.groove_centre if middle is None else middle
@@ -126,7 +126,7 @@ def draw_gland(axes: Axes, p: Seal, middle: float | None = None) -> None:
         axes.fill([left, edge, edge, left], [rod, rod, housing, housing], color=_FLUID, lw=0)
     metal: Any = {"facecolor": _METAL, "edgecolor": _LINE, "linewidth": 0.9}
     axes.fill(*np.concatenate([line, line[::-1] - [0.0, size]]).T, **metal)
-    axes.fill(*np.concatenate([groove, beside[::-1]]).T, **metal)
+    axes.fill(*np.concatenate([groove, wall[::-1]]).T, **metal)
     sides = p.sealed_wall - around, p.air_wall + around
     axes.set(xlim=sides, ylim=(rod - around, housing + around))
     axes.set_aspect("equal")
@@ -139,10 +139,10 @@ def _draw_ring(axes: Axes, section: Section, levels: Array) -> TriContourSet:
     triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     grid = Triangulation(section.points[:, 0], section.points[:, 1], triangles)
     stress = nodal_von_mises(section)
-    shown: TriContourSet = axes.tricontourf(grid, stress, levels=levels, cmap="YlOrRd")
+    contours: TriContourSet = axes.tricontourf(grid, stress, levels=levels, cmap="YlOrRd")
     edges = section.points[boundary_edges(cells)]
     axes.add_collection(LineCollection(list(edges), colors=_LINE, linewidths=0.9))
-    return shown
+    return contours
 
 
 def _draw_film(axes: Axes, p: Gland, profile: Profile, height: float) -> None:

@@ -78,8 +78,8 @@ def between(p: Gland) -> str:
 def by_stroke(rows: Iterable[FilmRow]) -> dict[str, list[FilmRow]]:
     """Stroke -> its rows by rising |U|, of the strokes that have any."""
     rising = sorted(rows, key=lambda row: abs(row.rod_speed_mm_s))
-    found = {stroke: [row for row in rising if row.stroke == stroke] for stroke in STROKES}
-    return {stroke: some for stroke, some in found.items() if some}
+    rows_by_stroke = {stroke: [row for row in rising if row.stroke == stroke] for stroke in STROKES}
+    return {stroke: some for stroke, some in rows_by_stroke.items() if some}
 
 
 def write_head(figure: Figure, text: str) -> None:
@@ -87,12 +87,12 @@ def write_head(figure: Figure, text: str) -> None:
     figure.suptitle(text, x=0.01, ha="left", fontsize=7.5, color="0.25")
 
 
-def write_beside(axes: Axes, place: Place, text: str, shift: Place, **look: Any) -> None:
+def write_beside(axes: Axes, position: Place, text: str, shift: Place, **look: Any) -> None:
     """Small letters that stand to this side of a place, by so many points."""
     across = {0: "center", 1: "left", -1: "right"}[int(np.sign(shift[0]))]
     up = {0: "center", 1: "bottom", -1: "top"}[int(np.sign(shift[1]))]
     where = {"xytext": shift, "textcoords": "offset points", "ha": across, "va": up}
-    axes.annotate(text, place, **{"fontsize": "x-small", **where, **look})
+    axes.annotate(text, position, **{"fontsize": "x-small", **where, **look})
 
 
 def radial_axis(axes: Axes, p: Gland) -> None:

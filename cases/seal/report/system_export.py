@@ -39,26 +39,28 @@ class SealMap:
 
     def stroke(self, sign: float) -> SealMap:
         """The part of one stroke: 1 out, -1 in."""
-        here = sign * self.speeds > 0.0
-        return SealMap(self.speeds[here], self.pressures, self.friction[here], self.leakage[here])
+        selected = sign * self.speeds > 0.0
+        return SealMap(
+            self.speeds[selected], self.pressures, self.friction[selected], self.leakage[selected]
+        )
 
     @classmethod
     def of(cls, runs: Sequence[FinishedRun]) -> SealMap:
         """The films of runs of one seal, at the speeds that all pressures have.  BadInput."""
         _require_one_seal(runs)
-        found: dict[tuple[float, float], FilmRow] = {
+        rows_by_point: dict[tuple[float, float], FilmRow] = {
             (row.rod_speed_mm_s, row.sealed_pressure_MPa): row for run in runs for row in run.rows
         }
-        pressures = sorted({p for _, p in found})
-        asked = sorted({u for u, _ in found})
-        speeds = [u for u in asked if all((u, p) in found for p in pressures)]
+        pressures = sorted({p for _, p in rows_by_point})
+        requested = sorted({u for u, _ in rows_by_point})
+        speeds = [u for u in requested if all((u, p) in rows_by_point for p in pressures)]
         if not speeds:
             raise BadInput(
                 "no speed has a film at every sealed pressure: give runs of the same speeds"
             )
-        lacking = [f"{u:+g} mm/s" for u in asked if u not in speeds]
+        lacking = [f"{u:+g} mm/s" for u in requested if u not in speeds]
         friction, leakage = (
-            np.array([[getattr(found[u, p], name) for p in pressures] for u in speeds])
+            np.array([[getattr(rows_by_point[u, p], name) for p in pressures] for u in speeds])
             for name in ("rod_friction_N", "leak_rate_mm3_s")
         )
         return cls(np.array(speeds), np.array(pressures), friction, leakage, ", ".join(lacking))
@@ -106,7 +108,7 @@ class FrictionLaw:
     @property
     def numbers(self) -> dict[str, tuple[float, str]]:
         """Numbers that the block asks for, in SI units."""
-        own = {
+        block_numbers = {
             "Cylinder Friction": {
                 "Breakaway friction increase coefficient": (self.breakaway, ""),
                 "Transition coefficient": (1e3 * self.rate, "s/m"),
@@ -119,7 +121,7 @@ class FrictionLaw:
         return {
             "Preload force": (self.preload, "N"),
             "Coulomb friction coefficient": (1e-6 * self.coulomb, "N/Pa"),
-            **own[self.block],
+            **block_numbers[self.block],
             "Viscous friction coefficient": (1e3 * self.viscous, "N/(m/s)"),
             "largest misfit": (100.0 * self.misfit, "%"),
         }
@@ -173,15 +175,15 @@ def write_hand_over(folder: Path, runs: Sequence[FinishedRun]) -> list[str]:
     write_text(folder / FILES[2], simscape(laws, title))
     sizes = (len(seal.speeds), "speed"), (len(seal.pressures), "pressure")
     counts = " at ".join(f"{count} {what}{'s' * (count != 1)}" for count, what in sizes)
-    said = [f"{counts} written to {folder}"]
+    lines = [f"{counts} written to {folder}"]
     if seal.left_out:
-        said.append(f"left out, as not every pressure has them: {seal.left_out}")
+        lines.append(f"left out, as not every pressure has them: {seal.left_out}")
     if not laws:
-        said.append("no friction law: a fit needs 5 films at two speeds |U| or more")
+        lines.append("no friction law: a fit needs 5 films at two speeds |U| or more")
     for name, law in laws.items():
-        said.append(f"{name}: within {100.0 * law.misfit:.2g} % of every film")
+        lines.append(f"{name}: within {100.0 * law.misfit:.2g} % of every film")
     doubtful = sum(row.verdict != "ok" for run in runs for row in run.rows)
-    return [*said, f"films with a verdict other than ok: {doubtful}"] if doubtful else said
+    return [*lines, f"films with a verdict other than ok: {doubtful}"] if doubtful else lines
 
 
 def modelica(seal: SealMap) -> str:
@@ -210,12 +212,12 @@ def simscape(laws: Mapping[str, FrictionLaw], title: str) -> str:
 def friction_laws(seal: SealMap) -> dict[str, FrictionLaw]:
     """The law of each block for both strokes, and for each alone where there are enough films."""
     parts = {"both strokes": seal, "outstroke": seal.stroke(1.0), "instroke": seal.stroke(-1.0)}
-    found = {
+    laws = {
         f"{block}, {name}": FrictionLaw.fitted(part, block)
         for name, part in parts.items()
         for block in BLOCKS
     }
-    return {name: law for name, law in found.items() if law is not None}
+    return {name: law for name, law in laws.items() if law is not None}
 
 
 def _require_one_seal(runs: Sequence[FinishedRun]) -> None:

@@ -30,8 +30,8 @@ def fit_of(p: Seal) -> Fit | None:
 
 def write_fit(p: Seal, folder: Path) -> None:
     """The points of the tests with the stresses of the model there.  OSError, ValueError."""
-    if found := fit_of(p):
-        data, model = found.data, found.model
+    if result := fit_of(p):
+        data, model = result.data, result.model
         numbers = np.stack([data.stretch, data.stress, model, model - data.stress], axis=1)
         rows = [(t, *row) for t, row in zip(data.test.tolist(), numbers.tolist(), strict=True)]
         write_csv(folder / "fit.csv", (*COLUMNS, "model_MPa", "difference_MPa"), rows)
@@ -41,44 +41,46 @@ def read_slopes(p: Seal, folder: Path) -> Slopes:
     """The sensitivities of a run, parameters in the words of its seal; none where it has no table
     of them.  OSError, ValueError.
     """
-    found = _slopes(SensitivityRow.read(folder / "sensitivity.csv"))
-    return {at: {_named(p, key): s for key, s in of.items()} for at, of in found.items()}
+    rows_read = _log_derivatives(SensitivityRow.read(folder / "sensitivity.csv"))
+    return {at: {_named(p, key): s for key, s in of.items()} for at, of in rows_read.items()}
 
 
 def write_sensitivities(p: Seal, folder: Path, rows: Sequence[FilmRow]) -> None:
     """Join those of the states into `sensitivity.csv`; tolerances.  Raises OSError, ValueError."""
     states = [SensitivityRow.read(folder / f"sensitivity_{row.name}.csv") for row in rows]
-    found = [line for lines in states for line in lines]
-    if not found:
+    rows_read = [line for lines in states for line in lines]
+    if not rows_read:
         return
-    write_csv(folder / "sensitivity.csv", SensitivityRow.header(), [r.cells() for r in found])
-    if shares := read_tolerances(p):
+    write_csv(folder / "sensitivity.csv", SensitivityRow.header(), [r.cells() for r in rows_read])
+    if tolerances := read_tolerances(p):
         bands = [
-            band((p.sealed_pressure, speed), quantity, slopes, shares)
-            for (speed, quantity), slopes in _slopes(found).items()
+            band((p.sealed_pressure, speed), quantity, log_derivatives, tolerances)
+            for (speed, quantity), log_derivatives in _log_derivatives(rows_read).items()
         ]
         write_csv(folder / "tolerances.csv", ToleranceRow.header(), [b.cells() for b in bands])
 
 
-def told(p: Seal, folder: Path) -> list[str]:
+def sensitivity_lines(p: Seal, folder: Path) -> list[str]:
     """A line for each speed: the effect of tolerances, and the three keys that matter most."""
-    bands, slopes = ToleranceRow.read(folder / "tolerances.csv"), read_slopes(p, folder)
+    bands, log_derivatives = ToleranceRow.read(folder / "tolerances.csv"), read_slopes(p, folder)
     lines = []
-    for speed in dict.fromkeys(speed for speed, _ in slopes):
-        words = [
+    for speed in dict.fromkeys(speed for speed, _ in log_derivatives):
+        texts = [
             f"{_called(b.quantity)} {b.likely_percent:.2g} % (at worst {b.worst_percent:.2g} %, "
             f"most of it {b.largest})"
             for b in bands
             if b.rod_speed_mm_s == speed and b.quantity in SHOWN
         ]
-        if words:
-            lines.append(f"  {speed:+g} mm/s, likely changes by tolerances: {'; '.join(words)}")
-        words = []
+        if texts:
+            lines.append(f"  {speed:+g} mm/s, likely changes by tolerances: {'; '.join(texts)}")
+        texts = []
         for quantity in SHOWN:
-            most = sorted(slopes[speed, quantity].items(), key=lambda item: -abs(item[1]))[:3]
-            named = ", ".join(f"{name} {slope:+.2g} %" for name, slope in most)
-            words.append(f"{_called(quantity)}: {named}")
-        lines.append(f"  {speed:+g} mm/s, for 1 % of a key: {'; '.join(words)}")
+            largest = sorted(
+                log_derivatives[speed, quantity].items(), key=lambda item: -abs(item[1])
+            )[:3]
+            named = ", ".join(f"{name} {slope:+.2g} %" for name, slope in largest)
+            texts.append(f"{_called(quantity)}: {named}")
+        lines.append(f"  {speed:+g} mm/s, for 1 % of a key: {'; '.join(texts)}")
     return lines
 
 
@@ -93,9 +95,9 @@ def _called(quantity: str) -> str:
     return "h*" if quantity == "h_star" else quantity
 
 
-def _slopes(rows: Sequence[SensitivityRow]) -> Slopes:
-    found: dict[tuple[float, str], dict[str, float]] = {}
+def _log_derivatives(rows: Sequence[SensitivityRow]) -> Slopes:
+    derivatives: dict[tuple[float, str], dict[str, float]] = {}
     for row in rows:
-        of_one = found.setdefault((row.rod_speed_mm_s, row.quantity), {})
+        of_one = derivatives.setdefault((row.rod_speed_mm_s, row.quantity), {})
         of_one[row.parameter] = row.log_derivative
-    return found
+    return derivatives

@@ -89,10 +89,10 @@ class Layout:
 
     def pressed(self, mesh: SectionMesh) -> int:
         """The first outer segment that the sealed pressure acts on, which it does up to the arc."""
-        begin, crown = mesh.places[0], self.pressure_boundaries[1]
+        begin, crown = mesh.positions[0], self.pressure_boundaries[1]
         crown = self.shape.pressure[0] if crown is None else crown
         crown = begin + (crown - begin) % mesh.length
-        return int(np.argmin(np.abs(mesh.places[mesh.arc :] - crown)))
+        return int(np.argmin(np.abs(mesh.positions[mesh.arc :] - crown)))
 
     def lowest(self, mesh: SectionMesh) -> int:
         """The arc node at which the sealed pressure of the contact ends.
@@ -101,20 +101,20 @@ class Layout:
         outline, not of the mesh: nodes stand elsewhere on each of two lobes, so that one mesh would
         have the pressure in the groove and the next one not.
         """
-        place = self.pressure_boundaries[0]
-        place = self._last_lobe if place is None else place
-        return int(np.argmin(np.abs(mesh.arc_places - (place - self.film[0]))))
+        position = self.pressure_boundaries[0]
+        position = self._last_lobe if position is None else position
+        return int(np.argmin(np.abs(mesh.arc_places - (position - self.film[0]))))
 
     @cached_property
     def _last_lobe(self) -> float:
         """Place of the last of the lowest points of the film, the middle of a flat."""
-        places, (_, low, _, high) = np.linspace(*self.film, _LOOKED_AT), self.shape.outline.box
-        r = self.shape.outline.at(places)[:, 1]
+        positions, (_, low, _, high) = np.linspace(*self.film, _LOOKED_AT), self.shape.outline.box
+        r = self.shape.outline.at(positions)[:, 1]
         level = np.flatnonzero(r <= r.min() + _LEVEL * (high - low))
         flat = np.split(level, np.flatnonzero(np.diff(level) > 1) + 1)[-1]
-        return float(places[flat[len(flat) // 2]])
+        return float(positions[flat[len(flat) // 2]])
 
-    def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> Layout:
+    def with_sealed_ends(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> Layout:
         """Layout whose sealed pressure ends where contact holds it back.
 
         rod, housing: pressures in excess of it, (arc nodes,) and (outer nodes,) of this mesh, MPa.
@@ -124,16 +124,16 @@ class Layout:
         crown = pressure_boundary(housing[::-1], last - self.pressed(mesh), p_s)
         on_rod, on_housing = self.pressure_boundaries
         if lip is not None:
-            on_rod = float(mesh.places[lip])
+            on_rod = float(mesh.positions[lip])
         if crown is not None:
-            on_housing = float(mesh.places[(mesh.arc + last - crown) % len(mesh.boundary)])
+            on_housing = float(mesh.positions[(mesh.arc + last - crown) % len(mesh.boundary)])
         return replace(self, pressure_boundaries=(on_rod, on_housing))
 
-    def between(self, old: Layout, ends: tuple[float, float]) -> Layout:
+    def between(self, old: Layout, arc_bounds: tuple[float, float]) -> Layout:
         """Layout with the pressure boundaries of another one, and its arc between these places on
         the arc of that one, unless its mesh is that of a file.
         """
-        begin, end = (old.film[0] + place for place in ends)
+        begin, end = (old.film[0] + position for position in arc_bounds)
         film = (begin, end) if self.base is None else self.film
         return replace(self, film=film, pressure_boundaries=old.pressure_boundaries)
 
@@ -173,8 +173,8 @@ def uniform_layout(p: Seal) -> Layout:
     return Layout(shape, film, Sizes(p.lobes * LONG_PLACED))
 
 
-def _reaching(shape: Shape, most: float) -> tuple[float, float]:
-    """The film (s0, s1) of a shape and as much as `most`, mm, of what faces the rod behind it.
+def _reaching(shape: Shape, extension: float) -> tuple[float, float]:
+    """The film (s0, s1) of a shape and as much as `extension`, mm, of what faces the rod behind it.
 
     The sealed pressure rolls it onto the rod. A cap ends it too.
     """
@@ -183,7 +183,7 @@ def _reaching(shape: Shape, most: float) -> tuple[float, float]:
     _, steep = gentle(shape.outline, 0.5 * pi)
     last = (steep - begin) % length if shape.chord is None else (shape.chord[1] - begin) % length
     film = (end - begin) % length
-    return begin, begin + min(max(film, last), film + most)
+    return begin, begin + min(max(film, last), film + extension)
 
 
 def _fine_at_edge(shape: Shape) -> Spacing:

@@ -29,7 +29,7 @@ class SealSection:
 
     layout: of the mesh. placed: whether its arc was placed by the contact; then every
     boundary node may touch the walls of the groove, else (the paper's scheme) those off the arc.
-    own: regions with materials of their own, whose elements come first, in this order.
+    own_regions: regions with materials of their own, whose elements come first, in this order.
     density: of the mesh.
     """
 
@@ -37,7 +37,7 @@ class SealSection:
     mesh: SectionMesh
     density: Fraction
     placed: bool = False
-    own: tuple[str, ...] = ()
+    own_regions: tuple[str, ...] = ()
 
     @cached_property
     def elements(self) -> Mapping[str, Integers]:
@@ -92,17 +92,17 @@ class SealSection:
         Of the section as it is meshed, so that what holds its mean rotation is a pure couple.
         """
         corner = self.mesh.points[self.mesh.boundary]
-        near = corner - corner[0]
-        after = np.roll(near, -1, axis=0)
-        cross = near[:, 0] * after[:, 1] - after[:, 0] * near[:, 1]
+        relative = corner - corner[0]
+        after = np.roll(relative, -1, axis=0)
+        cross = relative[:, 0] * after[:, 1] - after[:, 0] * relative[:, 1]
         area = 0.5 * float(cross.sum())
-        centre = cross @ (near + after) / (6.0 * area)
-        squares = (near**2 + near * after + after**2).sum(axis=1)
+        centre = cross @ (relative + after) / (6.0 * area)
+        squares = (relative**2 + relative * after + after**2).sum(axis=1)
         polar = float(cross @ squares) / 12.0 - area * float(centre @ centre)
         return area, corner[0] + centre, polar
 
     @property
-    def places(self) -> Array:
+    def positions(self) -> Array:
         """Lengths (arc nodes,) along the undeformed arc from its sealed end, mm."""
         return self.mesh.arc_places
 
@@ -113,21 +113,21 @@ class SealSection:
 
     def node_moduli(self, p: Solid) -> Array:
         """Shear modulus (nodes,) of the stiffest material at a node, MPa."""
-        found = np.full(len(self.mesh.points), p.shear_modulus)
-        for name in self.own:
+        moduli = np.full(len(self.mesh.points), p.shear_modulus)
+        for name in self.own_regions:
             nodes = self.elements[name]
-            found[nodes] = np.maximum(found[nodes], p.rubber(name).shear_modulus)
-        return found
+            moduli[nodes] = np.maximum(moduli[nodes], p.rubber(name).shear_modulus)
+        return moduli
 
     def _solids(self) -> dict[str, Integers]:
         """Elements of each region with a material of its own, and BODY, the others behind them."""
         mesh, done = self.mesh, 0
-        found = {}
-        for name in self.own:
+        solids = {}
+        for name in self.own_regions:
             cells = mesh.regions[name]
             assert np.array_equal(cells, np.arange(done, done + len(cells)))
-            found[name], done = mesh.quads[cells], done + len(cells)
-        return {**found, BODY: mesh.quads[done:]} if done < len(mesh.quads) else found
+            solids[name], done = mesh.quads[cells], done + len(cells)
+        return {**solids, BODY: mesh.quads[done:]} if done < len(mesh.quads) else solids
 
     def _sealed_side(self) -> Integers:
         """Segments from the crown to the sealed end of the arc."""
@@ -142,16 +142,16 @@ def seal_section(
     layout: of the mesh, with equal segments if left out. density: instead of the case's.
     """
     layout, density = layout or uniform_layout(p), density or Fraction(p.density)
-    own = tuple(p.materials)
-    mesh = _ordered(layout.mesh(density), own)
-    return SealSection(layout, mesh, density, placed=p.given_arc is None, own=own)
+    regions = tuple(p.materials)
+    mesh = _ordered(layout.mesh(density), regions)
+    return SealSection(layout, mesh, density, placed=p.given_arc is None, own_regions=regions)
 
 
-def _ordered(mesh: SectionMesh, own: tuple[str, ...]) -> SectionMesh:
+def _ordered(mesh: SectionMesh, names: tuple[str, ...]) -> SectionMesh:
     """The mesh with the elements of these regions first, in this order."""
-    if not own:
+    if not names:
         return mesh
-    first = np.concatenate([mesh.regions[name] for name in own])
+    first = np.concatenate([mesh.regions[name] for name in names])
     order = np.concatenate([first, np.setdiff1d(np.arange(len(mesh.quads)), first)])
     number = np.argsort(order)
     regions = {name: number[cells] for name, cells in mesh.regions.items()}

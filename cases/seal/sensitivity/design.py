@@ -64,17 +64,17 @@ class Target:
     @classmethod
     def of(cls, text: str) -> Target:
         """From "friction -10 %".  Raises NoDesignError."""
-        found = _TARGET.fullmatch(text.strip().replace("h*", "h_star"))
-        if not found or found["name"] not in QUANTITIES or float(found["change"]) <= -100.0:
-            hint = did_you_mean(found["name"], QUANTITIES) if found else ""
+        match = _TARGET.fullmatch(text.strip().replace("h*", "h_star"))
+        if not match or match["name"] not in QUANTITIES or float(match["change"]) <= -100.0:
+            hint = did_you_mean(match["name"], QUANTITIES) if match else ""
             raise NoDesignError(
                 f'the target "{text}" is not understood{hint}; allowed: a change in per cent of '
                 f'{", ".join(QUANTITIES)}, as in "friction -10%"'
             )
-        return cls(found["name"], 1.0 + 0.01 * float(found["change"]))
+        return cls(match["name"], 1.0 + 0.01 * float(match["change"]))
 
     @property
-    def words(self) -> str:
+    def title(self) -> str:
         """Name of the quantity for readers."""
         return CALLED[self.quantity][0]
 
@@ -83,7 +83,7 @@ class Target:
         """Of the quantity."""
         return CALLED[self.quantity][1]
 
-    def told(self, value: float) -> str:
+    def value_text(self, value: float) -> str:
         """A value of the quantity as it is typed."""
         return f"{self.quantity} = {value:.5g} {self.unit}"
 
@@ -105,7 +105,7 @@ class Lever:
         return value if p.called(self.key) == self.key else -value
 
     @property
-    def words(self) -> str:
+    def title(self) -> str:
         """Its name for readers."""
         return self.name.replace("_", " ")
 
@@ -114,7 +114,7 @@ class Lever:
         """Of its value."""
         return next(one.unit for one in keys_of(Seal) if one.name == self.name)
 
-    def told(self, p: Seal) -> str:
+    def value_text(self, p: Seal) -> str:
         """Its value in words."""
         return f"{self.name} = {self.value(p):.6g} {self.unit}".rstrip()
 
@@ -133,14 +133,14 @@ class Step:
 
 def value_of(state: FilmState, quantity: str) -> float:
     """A quantity of a film, in the units of `curve.csv`; leakage and friction without sign."""
-    found = {
+    values = {
         "h_star": state.h_star_um,
         "friction": state.rod_friction_N,
         "leakage": state.leak_rate_mm3_s,
         "p_max": state.p_max_MPa,
         "contact_width": state.contact_end_mm - state.contact_start_mm,
     }
-    return abs(found[quantity])
+    return abs(values[quantity])
 
 
 def slope_of(state: FilmState, quantity: str, key: str) -> float:
@@ -149,16 +149,16 @@ def slope_of(state: FilmState, quantity: str, key: str) -> float:
     return state.sensitivity.get(quantity, {}).get(key, 0.0)
 
 
-def changed(p: Seal, wrong: str, **keys: Any) -> Seal:
+def changed(p: Seal, message: str, **keys: Any) -> Seal:
     """The case with other values of some keys.
 
-    wrong: words of the NoDesignError where a case cannot have them.
+    message: words of the NoDesignError where a case cannot have them.
     """
     try:
         return Seal(**{**p.settled(), **keys})
     except ValidationError as error:
         reason = error.errors()[0]["msg"].removeprefix("Value error, ")
-        raise NoDesignError(f"{wrong}: {reason}") from None
+        raise NoDesignError(f"{message}: {reason}") from None
 
 
 Change = Callable[[float], float | None]
@@ -179,46 +179,49 @@ def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[Step]:
     called, value = p.called(by.key), float(getattr(p, by.key))
     state, _ = _film(p, by, solve)
     steps = [Step(value, value_of(state, target.quantity), state)]
-    wanted = target.factor * steps[0].quantity
+    target_value = target.factor * steps[0].quantity
     for _ in range(STEPS):
         slope = slope_of(state, target.quantity, by.key)
-        way = math.log(wanted / steps[-1].quantity)
-        if abs(way) > 0.5 * abs(slope):  # the key would change by more than half
+        log_change = math.log(target_value / steps[-1].quantity)
+        if abs(log_change) > 0.5 * abs(slope):  # the key would change by more than half
             raise NoDesignError(
                 f"{target.quantity} follows {called} by {slope:.2g} % for 1 %: that is too "
                 "little for this target; choose another key (sensitivity.csv shows which have an "
                 "influence)"
             )
-        value *= math.exp(way / slope)
-        wrong = f"the target needs a {called} that a case cannot have"
-        near = changed(p, wrong, **{by.key: value})
-        state, change = _film(near, by, solve)
+        value *= math.exp(log_change / slope)
+        message = f"the target needs a {called} that a case cannot have"
+        changed_case = changed(p, message, **{by.key: value})
+        state, change = _film(changed_case, by, solve)
         steps.append(Step(value, value_of(state, target.quantity), state))
-        if abs(steps[-1].quantity / wanted - 1.0) <= TOLERANCE:
-            missed = f"near {by.told(near)} no value gives {target.told(wanted)} on one mesh"
-            return [*steps, *settled(steps[-1], wanted, slope, change, missed)]
+        if abs(steps[-1].quantity / target_value - 1.0) <= TOLERANCE:
+            value_near, goal = by.value_text(changed_case), target.value_text(target_value)
+            missed = f"near {value_near} no value gives {goal} on one mesh"
+            return [*steps, *settled(steps[-1], target_value, slope, change, missed)]
     raise NoDesignError(
-        f"{target.told(steps[-1].quantity)} after {STEPS} solves, wanted was {wanted:.5g}: ask for "
-        "a smaller change"
+        f"{target.value_text(steps[-1].quantity)} after {STEPS} solves, wanted was "
+        f"{target_value:.5g}: ask for a smaller change"
     )
 
 
-def settled(near: Step, wanted: float, slope: float, change: Change, missed: str) -> list[Step]:
-    """Steps on the mesh of `near`, until the quantity is what was wanted, to `SETTLED`.
+def settled(
+    first: Step, target_value: float, slope: float, change: Change, missed: str
+) -> list[Step]:
+    """Steps on the mesh of `first`, until the quantity is what was wanted, to `SETTLED`.
 
     slope: d log quantity / d log key. missed: words of the NoDesignError where it is not reached.
     """
-    steps, rise = [near], slope
+    steps, rise = [first], slope
     advice = "use a larger density, or ask for another change"
-    while abs(steps[-1].quantity / wanted - 1.0) > SETTLED:
+    while abs(steps[-1].quantity / target_value - 1.0) > SETTLED:
         if rise * slope <= 0.0 or len(steps) > STEPS:
             raise NoDesignError(f"{missed}: the film is at a kink; {advice}")
         last = steps[-1]
-        value = last.value * (wanted / last.quantity) ** (1.0 / rise)
-        found = change(value / near.value)
-        if found is None:
+        value = last.value * (target_value / last.quantity) ** (1.0 / rise)
+        ratio = change(value / first.value)
+        if ratio is None:
             raise NoDesignError(f"{missed}: no film is found on the way; {advice}")
-        steps.append(Step(value, near.quantity * found))
+        steps.append(Step(value, first.quantity * ratio))
         rise = math.log(steps[-1].quantity / last.quantity) / math.log(value / last.value)
     return steps[1:]
 
@@ -228,7 +231,7 @@ def _film(p: Seal, by: Lever, solve: Solve) -> Film:
     if film is None or not differentiable(film[0]) or film[0].sensitivity is None:
         verdict = "did not converge" if film is None else f"has the verdict {film[0].verdict}"
         raise NoDesignError(
-            f"with {by.told(p)} the film {verdict}: no sensitivities of it; use a "
+            f"with {by.value_text(p)} the film {verdict}: no sensitivities of it; use a "
             "larger density, or ask for a smaller change"
         )
     return film
@@ -286,27 +289,27 @@ class Design:
 
 def design_case(p: Seal, target: str, key: str, observer: Observer) -> Design:
     """The way to a target by a key.  Raises BadInput, also where it is not reached."""
-    asked = DIAMETERS.get(key, key)
-    base, _ = BASES.get(asked, (asked, asked))
-    known = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
-    if base not in known:
-        hint = f" ({INSTEAD[base]})" if base in INSTEAD else did_you_mean(base, known)
-        raise BadInput(f"--by {base}{hint}: allowed: {', '.join([*known, *BASES])}")
+    name = DIAMETERS.get(key, key)
+    base, _ = BASES.get(name, (name, name))
+    names = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
+    if base not in names:
+        hint = f" ({INSTEAD[base]})" if base in INSTEAD else did_you_mean(base, names)
+        raise BadInput(f"--by {base}{hint}: allowed: {', '.join([*names, *BASES])}")
     p = _one_film(p)
-    by, wanted = Lever(asked if asked in BASES else p.called(base), base), Target.of(target)
+    by, goal = Lever(name if name in BASES else p.called(base), base), Target.of(target)
 
     def solve(q: Seal) -> Film | None:
         film = HeldFilm.of(q, observer)
-        return (film.state, partial(film.change, wanted.quantity, base)) if film else None
+        return (film.state, partial(film.change, goal.quantity, base)) if film else None
 
-    return Design(p, wanted, by, designed(p, wanted, by, solve))
+    return Design(p, goal, by, designed(p, goal, by, solve))
 
 
 def _one_film(p: Seal) -> Seal:
     """The case of its first speed, at outstroke unless it has one stroke.  Raises BadInput."""
     stroke = "out" if p.stroke == "both" else p.stroke
-    given = {"speeds": p.speeds[:1], "stroke": stroke, "error_estimate": False}
-    return changed(p, "a design needs the sensitivities", **given, sensitivity=True)
+    updates = {"speeds": p.speeds[:1], "stroke": stroke, "error_estimate": False}
+    return changed(p, "a design needs the sensitivities", **updates, sensitivity=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,11 +329,11 @@ class HeldFilm:
             contact = DryContact.of(p, observer)
         except StageError:
             return None
-        found = contact.adapted(p.stroke, p.speeds[0])
-        if isinstance(found, NoFilm):
+        result = contact.adapted(p.stroke, p.speeds[0])
+        if isinstance(result, NoFilm):
             return None
         judge = Judge(verdict_of_contact(contact.system, contact.x), differentiation(p))
-        film, state = found.film, judge.state(found, None)
+        film, state = result.film, judge.state(result, None)
         observer.film_state(state)
         return cls(FilmCase(film.system, film.loads), film.x, contact.newton, state)
 
@@ -344,16 +347,16 @@ class HeldFilm:
 
         # a hundredth of a millimetre is many films; the least step moves a quantity that follows
         # tenfold by `SETTLED`
-        way, least = math.log(factor), 0.1 * SETTLED
-        path = Continuation(self.newton, StepRule(max(abs(way), least), least), name=key)
-        branch = path.follow(problem_at, 0.0, way, self.x)
+        log_factor, minimum = math.log(factor), 0.1 * SETTLED
+        path = Continuation(self.newton, StepRule(max(abs(log_factor), minimum), minimum), name=key)
+        branch = path.follow(problem_at, 0.0, log_factor, self.x)
         if not branch.converged:
             return None
-        there = quantities(self.case.scaled(key, factor - 1.0), branch.last.x)
-        return there[quantity].value / quantities(self.case, self.x)[quantity].value
+        changed_quantities = quantities(self.case.scaled(key, factor - 1.0), branch.last.x)
+        return changed_quantities[quantity].value / quantities(self.case, self.x)[quantity].value
 
 
-def told(design: Design) -> list[str]:
+def design_lines(design: Design) -> list[str]:
     """A design in words: its steps, and what it comes to."""
     p, target, steps = design.parameters, design.target, design.steps
     first, last = steps[0], steps[-1]
@@ -362,7 +365,7 @@ def told(design: Design) -> list[str]:
     values = [design.measure(step.value) for step in steps]
     lines = [f"p_s = {p.sealed_pressure:g} MPa, U = {sign * p.speeds[0]:+g} mm/s"]
     lines += [
-        f"  {name} = {value:.8g}{unit}: {target.told(step.quantity)}"
+        f"  {name} = {value:.8g}{unit}: {target.value_text(step.quantity)}"
         for step, value in zip(steps, values, strict=True)
     ]
     moved = 100.0 * (values[-1] / values[0] - 1.0)
@@ -374,6 +377,6 @@ def told(design: Design) -> list[str]:
     )
     if name in BASES:
         decided = Lever(p.called(design.by.key), design.by.key)
-        before, after = (decided.value(design.at(step.value)) for step in (first, last))
-        lines.append(f"{decided.name} from {before:.5g} to {after:.5g} mm")
+        previous, after = (decided.value(design.at(step.value)) for step in (first, last))
+        lines.append(f"{decided.name} from {previous:.5g} to {after:.5g} mm")
     return lines

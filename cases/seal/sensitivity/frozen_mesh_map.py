@@ -53,8 +53,8 @@ class FilmCase:
         if name == PRESSURE_KEY:
             film = replace(film, sealed_pressure=(1.0 + by) * film.sealed_pressure)
         value = times(p.measures.get(name, getattr(p, name)), 1.0 + by)
-        held = p.measures if name == "section_diameter" else {}
-        return FilmCase(frozen(self.system, p.model_copy(update={**held, name: value})), film)
+        fixed = p.measures if name == "section_diameter" else {}
+        return FilmCase(frozen(self.system, p.model_copy(update={**fixed, name: value})), film)
 
     def rate(self, name: str) -> Inputs:
         """The rate of its inputs by the logarithm of a parameter.
@@ -83,17 +83,20 @@ def frozen(system: SealSystem, p: Seal) -> SealSystem:
     The sealed pressure ends at the nodes at which it ended.
     """
     old, new = system.section.layout, uniform_layout(p)
-    before, after = old.shape.outline, new.shape.outline
+    previous, after = old.shape.outline, new.shape.outline
     section = system.section
-    if before.pieces == after.pieces:
+    if previous.pieces == after.pieces:
         return system.moved(p, section)
-    mesh = carried_mesh(section.mesh, before, after)
-    film = carried_places(np.array(old.film), before, after)
-    ends = mesh.places[section.lowest] - mesh.places[0] + film[0], mesh.places[section.crown]
+    mesh = carried_mesh(section.mesh, previous, after)
+    film = carried_places(np.array(old.film), previous, after)
+    end_positions = (
+        mesh.positions[section.lowest] - mesh.positions[0] + film[0],
+        mesh.positions[section.crown],
+    )
     layout = replace(
         new,
         film=(float(film[0]), float(film[1])),
         sizes=old.sizes,
-        pressure_boundaries=(float(ends[0]), float(ends[1])),
+        pressure_boundaries=(float(end_positions[0]), float(end_positions[1])),
     )
     return system.moved(p, replace(section, layout=layout, mesh=mesh))

@@ -31,24 +31,26 @@ _STEP = 1e-4
 class Edge:
     """An edge of a film, where it narrows from ten to one and a half times h*.
 
-    place: of its outer end on the undeformed arc, mm. opens: whether the film is thicker behind it.
-    moved: how far it moves with the places and thicknesses of the arc nodes, mm. thickness: how far
-    it moves as h* grows, mm for a unit of its logarithm.
+    position: of its outer end on the undeformed arc, mm. opens: whether the film is thicker behind
+    it. moved: how far it moves with the places and thicknesses of the arc nodes, mm. thickness: how
+    far it moves as h* grows, mm for a unit of its logarithm.
     """
 
-    place: float
+    position: float
     opens: bool
     moved: Quantity
     thickness: float
 
     def velocities(
-        self, slopes: Mapping[str, float], h_star: Mapping[str, float]
+        self, log_derivatives: Mapping[str, float], h_star: Mapping[str, float]
     ) -> dict[str, float]:
         """Parameter -> mm for a unit of its logarithm.
 
-        slopes: of `moved` by the parameters; h_star: those of the logarithm of h*.
+        log_derivatives: of `moved` by the parameters; h_star: those of the logarithm of h*.
         """
-        return {name: slope + self.thickness * h_star[name] for name, slope in slopes.items()}
+        return {
+            name: slope + self.thickness * h_star[name] for name, slope in log_derivatives.items()
+        }
 
 
 def edges(case: FilmCase, x: Array, h_star: float) -> list[Edge]:
@@ -57,9 +59,9 @@ def edges(case: FilmCase, x: Array, h_star: float) -> list[Edge]:
     An edge is where ln (h / h*) is carried along: v of d ln (h / h*) = -v (ln h)' ds, by least
     squares of its nodes.
     """
-    s, (_, h) = case.system.section.places, case.system.arc_film(x)
+    s, (_, h) = case.system.section.positions, case.system.arc_film(x)
     thin, rise = h < INLET[0] * h_star, np.gradient(h, s)
-    found = []
+    edges_found = []
     for i in np.flatnonzero(np.diff(thin)):
         inwards = range(i, len(h)) if thin[i + 1] else range(i + 1, -1, -1)
         count = next((n for n, k in enumerate(inwards) if h[k] < INLET[1] * h_star), len(inwards))
@@ -69,21 +71,21 @@ def edges(case: FilmCase, x: Array, h_star: float) -> list[Edge]:
         by_h[nodes] = -slope / (slope @ slope) / h[nodes]
         moved = Quantity(1.0, z=np.zeros(len(h)), h=by_h)
         thickness = float(slope.sum() / (slope @ slope))
-        found.append(Edge(float(s[nodes[0]]), not thin[i + 1], moved, thickness))
-    return found
+        edges_found.append(Edge(float(s[nodes[0]]), not thin[i + 1], moved, thickness))
+    return edges_found
 
 
-def velocities(case: FilmCase, found: Sequence[Edge]) -> list[Array]:
+def velocities(case: FilmCase, film_edges: Sequence[Edge]) -> list[Array]:
     """Of the nodes, (nodes, 2) each, as one edge moves along the arc at speed 1.
 
     The ends of the arc, corners and the other edges rest.
     """
     mesh, outline = case.system.mesh, case.system.section.layout.shape.outline
-    along, parts = outline.tangent(mesh.places[: mesh.arc + 1]), _parts(case, found)
-    moved = np.zeros((len(mesh.points), len(found), 2))
+    along, parts = outline.tangent(mesh.positions[: mesh.arc + 1]), _parts(case, film_edges)
+    moved = np.zeros((len(mesh.points), len(film_edges), 2))
     moved[mesh.arc_nodes] = parts[:, :, None] * along[:, None, :]
     moved = potential(mesh, moved.reshape(len(mesh.points), -1))
-    return np.split(moved, len(found), axis=1) if found else []
+    return np.split(moved, len(film_edges), axis=1) if film_edges else []
 
 
 def shifted(case: FilmCase, velocity: Array, by: float) -> FilmCase:
@@ -95,22 +97,24 @@ def shifted(case: FilmCase, velocity: Array, by: float) -> FilmCase:
 
 def shift_rate(case: FilmCase, velocity: Array) -> Inputs:
     """The rate of the inputs of a film as its nodes move at this velocity (nodes, 2), per mm."""
-    step = _STEP * float(case.system.section.places[-1])
+    step = _STEP * float(case.system.section.positions[-1])
     return rate_of(lambda by: Inputs.of(shifted(case, velocity, by).problem), step, degree=2)
 
 
-def _parts(case: FilmCase, found: Sequence[Edge]) -> Array:
+def _parts(case: FilmCase, film_edges: Sequence[Edge]) -> Array:
     """Part (arc nodes, edges) that a node has in the movement of an edge."""
-    mesh, s = case.system.mesh, case.system.section.places
-    corners = (case.system.section.layout.shape.outline.kinks - mesh.places[0]) % mesh.length
-    rest = [0.0, *corners[corners < s[-1]], s[-1]]
-    places = [(place, -1) for place in rest] + [(e.place, k) for k, e in enumerate(found)]
-    for k, (a, b) in enumerate(pairwise(found)):
+    mesh, s = case.system.mesh, case.system.section.positions
+    corners = (case.system.section.layout.shape.outline.kinks - mesh.positions[0]) % mesh.length
+    fixed_points = [0.0, *corners[corners < s[-1]], s[-1]]
+    positions = [(position, -1) for position in fixed_points] + [
+        (e.position, k) for k, e in enumerate(film_edges)
+    ]
+    for k, (a, b) in enumerate(pairwise(film_edges)):
         if b.opens:  # a contact lies between them
-            way = WITH_EDGE * (b.place - a.place)
-            places += [(a.place + way, k), (b.place - way, k + 1)]
-    at, owner = np.array(sorted(places)).T
-    parts = np.zeros((len(s), len(found)))
-    for k in range(len(found)):
+            reach = WITH_EDGE * (b.position - a.position)
+            positions += [(a.position + reach, k), (b.position - reach, k + 1)]
+    at, owner = np.array(sorted(positions)).T
+    parts = np.zeros((len(s), len(film_edges)))
+    for k in range(len(film_edges)):
         parts[1:-1, k] = np.interp(s[1:-1], at, owner == k)
     return parts

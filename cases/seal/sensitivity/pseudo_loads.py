@@ -65,7 +65,7 @@ def rate_of(inputs: Callable[[float], Inputs], step: float, degree: int = 4) -> 
 
 def _slope(pairs: Sequence[tuple[Array, Array]], step: float) -> Array:
     """d/ds of values ahead and behind by a step, and by two steps if they are given."""
-    rise, *wider = [ahead - behind for ahead, behind in pairs]
+    rise, *wider = [ahead - backward for ahead, backward in pairs]
     for wide in wider:
         rise = (8.0 * rise - wide) / 6.0
     return np.asarray(rise / (2.0 * step))
@@ -113,20 +113,20 @@ class FieldRates:
         """Field -> (elements, points): its rate when elements and parameters move by rows, unknowns
         held.
         """
-        still = np.zeros((len(rows), self._block.dofs.shape[1]))
-        return self._rates(np.hstack([rows, still]))
+        no_change = np.zeros((len(rows), self._block.dofs.shape[1]))
+        return self._rates(np.hstack([rows, no_change]))
 
     def by_unknowns(self, weights: Weights) -> Array:
         """Derivative (n,) of a weighted sum by all unknowns; elements without weight are left out.
 
         An element's fields depend on its own unknowns alone: one call for each of these.
         """
-        whole = self._block
-        chosen = np.flatnonzero(np.any([w.any(axis=1) for w in weights.values()], axis=0))
-        data = None if whole.data is None else whole.data[chosen]
-        coordinates, dofs = whole.coordinates[chosen], whole.dofs[chosen]
-        part = replace(whole, coordinates=coordinates, dofs=dofs, data=data)
-        some = {name: w[chosen] for name, w in weights.items()}
+        block = self._block
+        selected = np.flatnonzero(np.any([w.any(axis=1) for w in weights.values()], axis=0))
+        data = None if block.data is None else block.data[selected]
+        coordinates, dofs = block.coordinates[selected], block.dofs[selected]
+        part = replace(block, coordinates=coordinates, dofs=dofs, data=data)
+        some = {name: w[selected] for name, w in weights.items()}
         gradient = np.zeros(len(self.x))
         n, ndof = part.dofs.shape
         width = _rows(part, self.problem.parameters[self.name]).shape[1]

@@ -77,9 +77,9 @@ def _flux(
     top = int(first.start + np.argmax(at["p"][first].max(axis=1)))
     if case.system.parameters.reynolds == "dg":
         flux = case.problem.fields(FACET, x)["flux"]
-        chosen = slice(max(top - 1, 0), top + 1)
-        q, weights = float(flux[chosen].mean()), np.zeros_like(flux)
-        weights[chosen] = 1.0 / flux[chosen].size / q
+        segments = slice(max(top - 1, 0), top + 1)
+        q, weights = float(flux[segments].mean()), np.zeros_like(flux)
+        weights[segments] = 1.0 / flux[segments].size / q
         return q, {FACET: {"flux": weights}}
     dx, flux = at["dx"][top], at["flux"][top]
     q = float((flux * dx).sum() / dx.sum())
@@ -93,12 +93,12 @@ def _width(case: FilmCase, x: Array) -> Quantity:
     z, h = case.system.arc_film(x)
     level = contact_level(h)
     by_z, by_h = np.zeros(len(z)), np.zeros(len(z))
-    inside, ends = np.flatnonzero(h < level), []
+    inside, end_positions = np.flatnonzero(h < level), []
     for at, outside, sign in ((inside[0], -1, -1.0), (inside[-1], 1, 1.0)):
         other = at + outside
         if not 0 <= other < len(z):
             by_z[at] += sign
-            ends.append(z[at])
+            end_positions.append(z[at])
             continue
         rise = h[other] - h[at]
         t = (level - h[at]) / rise
@@ -109,8 +109,8 @@ def _width(case: FilmCase, x: Array) -> Quantity:
         by_h[other] -= sign * slope * t
         if level > CONTACT_FILM:
             by_h[h.argmin()] += sign * slope * GROOVE
-        ends.append(z[at] + t * (z[other] - z[at]))
-    width = float(ends[1] - ends[0])
+        end_positions.append(z[at] + t * (z[other] - z[at]))
+    width = float(end_positions[1] - end_positions[0])
     return Quantity(width, z=by_z / width, h=by_h / width)
 
 
@@ -151,8 +151,10 @@ def along(case: FilmCase, q: Quantity, name: str, rate: Inputs, moved: Moved) ->
         if block in moved:
             total += float(weighted(moved[block], weights).sum())
     if q.z is not None and q.h is not None:
-        ends = rate.blocks[FILM][:, :4].reshape(-1, 2, 2)  # (segments, both nodes, (z, r))
-        nodes = np.concatenate([ends[:, 0], ends[-1:, 1]])
+        nodes_by_segment = rate.blocks[FILM][:, :4].reshape(
+            -1, 2, 2
+        )  # (segments, both nodes, (z, r))
+        nodes = np.concatenate([nodes_by_segment[:, 0], nodes_by_segment[-1:, 1]])
         names = case.problem.assembler.block(FILM).kernel.parameters
         rod = rate.blocks[FILM][0, names.index("rod_radius") - len(names)]
         total += float(q.z @ nodes[:, 0] + q.h @ (nodes[:, 1] - rod))

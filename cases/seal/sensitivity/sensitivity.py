@@ -41,14 +41,14 @@ def adjoints(linear: LinearSolver, K: SparseMatrix, gradients: Array) -> Array:
 
 
 def rates_of(
-    case: FilmCase, known: Mapping[str, Inputs] = MappingProxyType({})
+    case: FilmCase, existing: Mapping[str, Inputs] = MappingProxyType({})
 ) -> dict[str, Inputs]:
     """Parameter -> rate of the inputs of a film by its logarithm.
 
-    known: the rates of another film of the system; of these only that of the speed is another.
+    existing: the rates of another film of the system; of these only that of the speed is another.
     """
-    kept = {name: rate for name, rate in known.items() if name != SPEED}
-    return {name: kept.get(name) or case.rate(name) for name in case.parameters}
+    reused = {name: rate for name, rate in existing.items() if name != SPEED}
+    return {name: reused.get(name) or case.rate(name) for name in case.parameters}
 
 
 Slopes = dict[str, dict[str, float]]
@@ -62,23 +62,24 @@ def sensitivities(
 
     rates: of the parameters, by `rates_of` at this film. Raises SingularMatrix.
     """
-    found = quantities(case, x)
-    moving = {f"edge {k}": e for k, e in enumerate(edges(case, x, found["h_star"].value))}
+    values = quantities(case, x)
+    moving = {f"edge {k}": e for k, e in enumerate(edges(case, x, values["h_star"].value))}
     nodes = zip(moving, velocities(case, list(moving.values())), strict=True)
     shifts = {name: shift_rate(case, velocity) for name, velocity in nodes}
-    of = {**found, **{name: edge.moved for name, edge in moving.items()}}
-    slopes = frozen_slopes(case, x, linear, {**rates, **shifts}, of)
-    for_parameters = {q: {key: slopes[q][key] for key in rates} for q in slopes}
-    ways = {
+    of = {**values, **{name: edge.moved for name, edge in moving.items()}}
+    log_derivatives = frozen_slopes(case, x, linear, {**rates, **shifts}, of)
+    for_parameters = {q: {key: log_derivatives[q][key] for key in rates} for q in log_derivatives}
+    edge_velocities = {
         name: edge.velocities(for_parameters[name], for_parameters["h_star"])
         for name, edge in moving.items()
     }
     return {
         q: {
-            key: slope + sum(ways[name][key] * slopes[q][name] for name in moving)
+            key: slope
+            + sum(edge_velocities[name][key] * log_derivatives[q][name] for name in moving)
             for key, slope in for_parameters[q].items()
         }
-        for q in found
+        for q in values
     }
 
 
@@ -97,12 +98,12 @@ def frozen_slopes(
     gradients = np.stack([by_unknowns(case, x, q) for q in of.values()], axis=1)
     loads = np.stack([tangent.load(rate) for rate in rates.values()], axis=1)
     through = -adjoints(linear, tangent.reduced, gradients).T @ loads
-    slopes: Slopes = {name: {} for name in of}
+    log_derivatives: Slopes = {name: {} for name in of}
     for j, (key, rate) in enumerate(rates.items()):
         moved = fields_along(case, x, rate, of.values())
         for i, (name, q) in enumerate(of.items()):
-            slopes[name][key] = float(through[i, j]) + along(case, q, key, rate, moved)
-    return slopes
+            log_derivatives[name][key] = float(through[i, j]) + along(case, q, key, rate, moved)
+    return log_derivatives
 
 
 def differentiation(p: Numerics) -> Differentiate | None:

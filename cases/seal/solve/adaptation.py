@@ -66,12 +66,12 @@ class Adapted:
 
         A finer mesh of the same arc does not add the oil beyond its ends.
         """
-        found, p = self.estimate, self.film.system.parameters
-        if found is None or not self.fits or not abs(found.h_star) <= LARGEST_ERROR:
+        estimate, p = self.estimate, self.film.system.parameters
+        if estimate is None or not self.fits or not abs(estimate.h_star) <= LARGEST_ERROR:
             return False
-        if not shows_inlet(found.film.inlet_ratio):
+        if not shows_inlet(estimate.film.inlet_ratio):
             return False
-        return found.beyond > LARGEST_ERROR or not reservation(p, found)
+        return estimate.beyond > LARGEST_ERROR or not reservation(p, estimate)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,17 +85,17 @@ class Adaptation:
     contacts: ContactSolver
     films: FilmSolver
 
-    def adapted(self, found: Film | NoFilm, last: Sequence[Adapted] = ()) -> Adapted | NoFilm:
+    def adapted(self, film: Film | NoFilm, last: Sequence[Adapted] = ()) -> Adapted | NoFilm:
         """A film on a mesh that fits it, from that on another mesh.
 
         last: films at other speeds. A film that ends early on a mesh is squeezed out anew on one
         that is made for the state it has reached. A film whose estimated error is too large is
         solved on finer meshes, which the estimate then compares.
         """
-        found = self._settled(found)
-        if isinstance(found, NoFilm):
-            return found
-        adapted = Adapted(found, self._coarser(found, last), self._fits(found, SHOWS))
+        film = self._settled(film)
+        if isinstance(film, NoFilm):
+            return film
+        adapted = Adapted(film, self._coarser(film, last), self._fits(film, SHOWS))
         while not adapted.sure:
             finer = self._finer(adapted.film)
             if not isinstance(finer, Film):
@@ -103,56 +103,56 @@ class Adaptation:
             adapted = Adapted(finer, adapted.film, self._fits(finer, SHOWS))
         return adapted
 
-    def _settled(self, found: Film | NoFilm) -> Film | NoFilm:
+    def _settled(self, film: Film | NoFilm) -> Film | NoFilm:
         """The film on a mesh of its density that fits it, if there is one."""
         for _ in range(CYCLES):
-            if isinstance(found, Film) and self._fits(found):
+            if isinstance(film, Film) and self._fits(film):
                 break
-            again = self._remeshed(found)
+            again = self._remeshed(film)
             if not isinstance(again, Film):
                 break
-            found = again
-        return found
+            film = again
+        return film
 
-    def _fits(self, film: Film, most: float = FITS) -> bool:
+    def _fits(self, film: Film, maximum: float = FITS) -> bool:
         """True if a mesh fits its film; a mesh that is given is as it is.
 
-        most: segments that the film may ask for in the place of one.
+        maximum: segments that the film may ask for in the place of one.
         """
         p = self.p
         if p.mesh != "graded":
             return True
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
-        return not film.numbers.short(fewest) and self._misfit(film) <= most
+        return not film.numbers.short(fewest) and self._misfit(film) <= maximum
 
     def _misfit(self, film: Film) -> float:
         return misfit(film.system, film.x, film.squeeze_film.scales.thickness)
 
-    def _remeshed(self, found: Film | NoFilm) -> Film | NoFilm | None:
+    def _remeshed(self, film: Film | NoFilm) -> Film | NoFilm | None:
         """The film on the mesh that is made for it; None where there is none."""
-        if found.begun is None or self.p.mesh != "graded":
+        if film.start_state is None or self.p.mesh != "graded":
             return None
-        squeeze_film, now = found.begun
+        squeeze_film, now = film.start_state
         system, thickness = squeeze_film.system, squeeze_film.scales.thickness
         layout = film_layout(system, now.x, thickness)
-        return self._carried(found, self._system(layout, system.section.density))
+        return self._carried(film, self._system(layout, system.section.density))
 
     def _coarser(self, film: Film, last: Sequence[Adapted]) -> Film | None:
         """The film on a coarser mesh, for the estimate; None without one."""
         if not (self.p.error_estimate and self.p.mesh == "graded"):
             return None
-        before = [a.coarser for a in last if a.coarser and a.film.system is film.system]
-        found: Film | NoFilm | None = None
-        if before:
-            solver = self.films.on(before[-1].system)
-            found = solver.from_neighbour(before, film.loads.speed)
+        previous = [a.coarser for a in last if a.coarser and a.film.system is film.system]
+        result: Film | NoFilm | None = None
+        if previous:
+            solver = self.films.on(previous[-1].system)
+            result = solver.from_neighbour(previous, film.loads.speed)
             system: SealSystem | None = solver.system
         else:
             density = coarser_density(film.system.section.density)
             system = self._system(film.system.section.layout, density)
-        if not isinstance(found, Film):
-            found = self._carried(film, system)
-        return found if isinstance(found, Film) else None
+        if not isinstance(result, Film):
+            result = self._carried(film, system)
+        return result if isinstance(result, Film) else None
 
     def _finer(self, film: Film) -> Film | NoFilm | None:
         """The film on a finer mesh of the same spacing; None where no such mesh would help."""
@@ -175,9 +175,9 @@ class Adaptation:
         It is squeezed out from the contact if none was found, or if the carried one ends. Two of
         three O-rings that take this have no `ok` at -10 mm/s without it (docs/validation).
         """
-        if system is None or found.begun is None:
+        if system is None or found.start_state is None:
             return None
-        squeeze_film, now = found.begun
+        squeeze_film, now = found.start_state
         try:
             dry = self.contacts.from_mesh(squeeze_film.system, squeeze_film.dry, system)
         except StageError:

@@ -72,13 +72,13 @@ def contact_layout(system: SealSystem, x: Array, p: Seal) -> Layout:
     begin -= system.section.layout.film[0]
     steepest = max(edge.rise for edge in edges)
     spots = [
-        Spot(min(max(edge.place - begin, 0.0), length), (edge.rise / steepest) ** -0.6)
+        Spot(min(max(edge.position - begin, 0.0), length), (edge.rise / steepest) ** -0.6)
         for edge in edges
     ]
     first = np.inf
     if p.opens:
         spots.append(_edge_spot(system, x, p, (begin, begin + length)))
-        first = spots[-1].most
+        first = spots[-1].maximum
     spacing = graded(length, spots, layout.long * DENSITY, coarsest=length / COARSEST, rate=RATE)
     return layout.graded(spacing, layout.long, first=first)
 
@@ -92,25 +92,27 @@ def on_wall(system: SealSystem, x: Array) -> bool:
 def _placed(system: SealSystem, x: Array, layout: Layout) -> Layout:
     """The layout with an arc that reaches as far as a film may matter in the contact state x."""
     seen, p = system.section.layout, system.parameters
-    ends = _way_out(system, x, 0), _way_out(system, x, 1)
+    arc_ends = _way_out(system, x, 0), _way_out(system, x, 1)
     pressing = system.pressing(ROD, x), system.pressing(BORE, x)
-    return layout.between(seen.held(system.mesh, *pressing, p.sealed_pressure), ends)
+    return layout.between(
+        seen.with_sealed_ends(system.mesh, *pressing, p.sealed_pressure), arc_ends
+    )
 
 
-def _edge_spot(system: SealSystem, x: Array, p: Gland, ends: tuple[float, float]) -> Spot:
-    """Place at which the section meets the edge of the gap, on an arc between `ends`, mm."""
+def _edge_spot(system: SealSystem, x: Array, p: Gland, arc_bounds: tuple[float, float]) -> Spot:
+    """Place at which the section meets the edge of the gap, on an arc between `arc_bounds`, mm."""
     nodes = system.mesh.arc_nodes
     centre = np.array([p.air_wall, 0.5 * p.rod_diameter])
     centre += p.corner_fillet + np.array([0.0, p.extrusion_gap])
     away = np.linalg.norm(system.deformed(x)[nodes] - centre, axis=1)
-    place = system.section.places[int(np.argmin(away))]
+    position = system.section.positions[int(np.argmin(away))]
     fine = 0.25 * p.corner_fillet
-    return Spot(min(place, ends[1]) - ends[0], np.inf, most=fine)
+    return Spot(min(position, arc_bounds[1]) - arc_bounds[0], np.inf, maximum=fine)
 
 
 def _way_out(system: SealSystem, x: Array, side: int) -> float:
     """Place on the arc (mm) of an end of the film: side 0 the sealed, 1 the air end."""
-    p, s = system.parameters, system.section.places
+    p, s = system.parameters, system.section.positions
     z, h = system.arc_film(x)
     touching = np.flatnonzero(system.pressing(ROD, x) > 0.0)
     if not len(touching):
@@ -138,9 +140,9 @@ def film_layout(system: SealSystem, x: Array, thickness: float) -> Layout:
     thickness: of the film at its inlet, mm, near enough.
     """
     s, size = sizes(system, x, thickness)
-    at, long_before = system.section.places, system.section.layout.long
-    before = np.diff(at) * system.mesh.arc / (long_before * DENSITY)
-    size = np.minimum(size, before[_segments(at, s)])
+    at, long_before = system.section.positions, system.section.layout.long
+    previous = np.diff(at) * system.mesh.arc / (long_before * DENSITY)
+    size = np.minimum(size, previous[_segments(at, s)])
     index = _index(s, size)
     long = _THIRDS * ceil(index[-1] / (DENSITY * _THIRDS))
     layout = system.section.layout
@@ -150,8 +152,8 @@ def film_layout(system: SealSystem, x: Array, thickness: float) -> Layout:
 def misfit(system: SealSystem, x: Array, thickness: float) -> float:
     """Largest number of segments that a film x (n,) asks for in the place of one of its mesh."""
     s, size = sizes(system, x, thickness)
-    wanted = np.diff(np.interp(system.section.places, s, _index(s, size)))
-    return float(wanted.max()) * float(system.section.density) / DENSITY
+    segments_needed = np.diff(np.interp(system.section.positions, s, _index(s, size)))
+    return float(segments_needed.max()) * float(system.section.density) / DENSITY
 
 
 def _index(s: Array, size: Array) -> Array:
@@ -161,22 +163,25 @@ def _index(s: Array, size: Array) -> Array:
 
 def sizes(system: SealSystem, x: Array, thickness: float) -> tuple[Array, Array]:
     """Places (n,) along the arc, mm, and lengths (n,) of the segments there, at density 2."""
-    at, (_, h), p = system.section.places, system.arc_film(x), film_pressure(system, x)
+    at, (_, h), p = system.section.positions, system.arc_film(x), film_pressure(system, x)
     dx = np.diff(at)
     log_h = np.log(np.maximum(h, _CLOSED * thickness))
     slope_h = np.abs(np.diff(log_h)) / dx
     slope_h[np.minimum(h[:-1], h[1:]) > INLET[0] * thickness] = 0.0  # too thick to decide
     slope_p = np.abs(np.diff(p)) / dx
-    wanted = np.maximum(slope_h / THINNING, slope_p / (RISE * np.abs(p).max()))
+    density_needed = np.maximum(slope_h / THINNING, slope_p / (RISE * np.abs(p).max()))
     longest = at[-1] / COARSEST_OF_FILM
-    segment = np.minimum(1.0 / np.maximum(wanted, 1e-12), longest)
+    segment = np.minimum(1.0 / np.maximum(density_needed, 1e-12), longest)
     s = np.linspace(0.0, at[-1], STATIONS)
-    there = segment[_segments(at, s)]
+    lengths = segment[_segments(at, s)]
     step = RATE * (s[1] - s[0])
-    for way in (slice(None), slice(None, None, -1)):  # no faster growth than RATE on either side
-        place = step * np.arange(STATIONS)
-        there[way] = np.minimum.accumulate(there[way] - place) + place
-    return s, there
+    for direction in (
+        slice(None),
+        slice(None, None, -1),
+    ):  # no faster growth than RATE on either side
+        offset = step * np.arange(STATIONS)
+        lengths[direction] = np.minimum.accumulate(lengths[direction] - offset) + offset
+    return s, lengths
 
 
 def _segments(at: Array, s: Array) -> Integers:

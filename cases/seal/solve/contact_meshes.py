@@ -51,11 +51,11 @@ COARSE = 1
 def contact_key(parameters: Seal) -> str:
     """Name of a contact state: all parameters but those without influence, and the kernels."""
     kernels = contact_kernels(parameters)
-    given = parameters.model_dump(exclude=set(WITHOUT_INFLUENCE))
+    values = parameters.model_dump(exclude=set(WITHOUT_INFLUENCE))
     if parameters.outline is not None:
-        given["outline"] = hashlib.sha256(Path(parameters.outline).read_bytes()).hexdigest()
-    given["kernels"] = {name: load_kernel(name).signature for name in kernels}
-    return hashlib.sha256(json.dumps(given, sort_keys=True).encode()).hexdigest()[:32]
+        values["outline"] = hashlib.sha256(Path(parameters.outline).read_bytes()).hexdigest()
+    values["kernels"] = {name: load_kernel(name).signature for name in kernels}
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:32]
 
 
 @dataclass(frozen=True)
@@ -125,9 +125,9 @@ class ContactMeshes:
         """On equal segments: the path on the coarsest mesh, then finer ones."""
         first = p.density if p.solver != "auto" else COARSE
         densities = list(_doublings(first, p.density))
-        kept = self.store.densities(p, densities) if p.solver == "auto" else []
-        system = build_system(_at(p, (*kept, first)[0]))
-        return self._finer(system, self._begun(system), p.density)
+        stored = self.store.densities(p, densities) if p.solver == "auto" else []
+        system = build_system(_at(p, (*stored, first)[0]))
+        return self._finer(system, self._first_state(system), p.density)
 
     def _graded(self, p: Seal) -> State:
         """On meshes that the contact places, the last of which is finer."""
@@ -135,7 +135,7 @@ class ContactMeshes:
         guide = min(DENSITY, p.density)
         coarse = guide if p.rubs else COARSE
         uniform = build_system(_at(p.model_copy(update={"mesh": "uniform"}), coarse))
-        seen = self._next((uniform, self._begun(uniform)), _at(p, coarse))
+        seen = self._next((uniform, self._first_state(uniform)), _at(p, coarse))
         return self._sealed(p, self._finer(*self._next(seen, _at(p, guide)), p.density))
 
     def _sealed(self, p: Seal, state: State) -> State:
@@ -151,7 +151,7 @@ class ContactMeshes:
         system = build_system(p, contact_layout(*state, p))
         return self.solver.from_mesh(*state, system, "contact on a graded mesh")
 
-    def _begun(self, system: SealSystem) -> Array:
+    def _first_state(self, system: SealSystem) -> Array:
         """Unknowns (n,) on the first mesh: a stored state if there is a good one, else the path."""
         p = system.parameters
         if p.solver == "auto" and self.store.densities(p, (p.density,)):

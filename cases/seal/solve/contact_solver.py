@@ -64,14 +64,16 @@ class Creeping:
 
     system: SealSystem
 
-    def step(self, before: Array, tau: float, load: float) -> Anchored:
+    def step(self, previous: Array, tau: float, load: float) -> Anchored:
         """See `Transient`; the load is always whole."""
         problem = contact_problem(self.system, self.system.parameters.sealed_pressure)
-        return Anchored(problem.since(before), csc_array(diags_array(self._springs / tau)), before)
+        return Anchored(
+            problem.since(previous), csc_array(diags_array(self._springs / tau)), previous
+        )
 
-    def change(self, before: Array, after: Array) -> float:
+    def change(self, previous: Array, after: Array) -> float:
         """Largest displacement of a node, over `MOVED`."""
-        moved = self.system.displacements(after) - self.system.displacements(before)
+        moved = self.system.displacements(after) - self.system.displacements(previous)
         return float(np.abs(moved).max() / (MOVED * self.system.parameters.section_diameter))
 
     @cached_property
@@ -81,10 +83,10 @@ class Creeping:
         springs = np.zeros(system.layout.total)
         for solid in system.solids:
             block = system.problem.assembler.block(solid)
-            places = block.coordinates.reshape(len(block.dofs), -1, 2)
-            density = np.full(len(places), p.shear_modulus / p.section_diameter**2)
-            shares = lumped(mass_matrices(CELLS["quad4"], places, density, ring=True))
-            np.add.at(springs, block.dofs, np.repeat(shares, 2, axis=1))
+            coordinates = block.coordinates.reshape(len(block.dofs), -1, 2)
+            density = np.full(len(coordinates), p.shear_modulus / p.section_diameter**2)
+            weights = lumped(mass_matrices(CELLS["quad4"], coordinates, density, ring=True))
+            np.add.at(springs, block.dofs, np.repeat(weights, 2, axis=1))
         return springs
 
 
@@ -139,44 +141,44 @@ class ContactSolver:
 
         Raises StageError.
         """
-        x, place = self._follow(system, approach_stage(system), system.at_rest()), None
+        x, position = self._follow(system, approach_stage(system), system.at_rest()), None
         if held_place(system.parameters) is not None:
             return x
         if system.parameters.sealed_pressure > 0.0:
-            x, place = at_air_wall(system, x)
+            x, position = at_air_wall(system, x)
         if system.parameters.rubs:
-            x, place = self._follow(system, release_stage(system, x), x), None
-        return self._loaded(system, x, place=place)
+            x, position = self._follow(system, release_stage(system, x), x), None
+        return self._loaded(system, x, position=position)
 
     def from_mesh(self, old: SealSystem, x: Array, new: SealSystem, name: str = "") -> State:
         """The contact state x (n,) of one mesh on another; name: of the stage.
 
         Raises StageError.
         """
-        p_s, before = new.parameters.sealed_pressure, self.checkpoint
+        p_s, previous = new.parameters.sealed_pressure, self.checkpoint
         with suppress(StageError):
             return new, self._corrected(Checkpoint(old, p_s, x), new, name)
-        if before:
+        if previous:
             with suppress(StageError):
-                start = self._corrected(before, new, f"contact at {before.pressure:.4g} MPa")
-                return new, self._loaded(new, start, before.pressure)
+                start = self._corrected(previous, new, f"contact at {previous.pressure:.4g} MPa")
+                return new, self._loaded(new, start, previous.pressure)
         return new, self.from_rest(new)
 
     def _corrected(self, state: Checkpoint, new: SealSystem, name: str) -> Array:
         """A state of another mesh on ours, (n,), under the same pressure."""
-        stage, start = carried_contact(state.system, new, state.x, state.pressure, name)
-        return self.driver.follow(stage, start)
+        path_stage, start = carried_contact(state.system, new, state.x, state.pressure, name)
+        return self.driver.follow(path_stage, start)
 
     def _loaded(
-        self, system: SealSystem, x: Array, begin: float = 0.0, place: float | None = None
+        self, system: SealSystem, x: Array, begin: float = 0.0, position: float | None = None
     ) -> Array:
-        """From the section x (n,) to the sealed pressure; begin, place: as of `load_stage`."""
+        """From the section x (n,) to the sealed pressure; begin, position: as of `load_stage`."""
         if not begin:
             self.checkpoint = None
-        stage = load_stage(system, begin, place)
-        stage = replace(stage, on_point=lambda point: self.keep(system, point))
+        path_stage = load_stage(system, begin, position)
+        path_stage = replace(path_stage, on_point=lambda point: self.keep(system, point))
         try:
-            return self._follow(system, stage, x)
+            return self._follow(system, path_stage, x)
         except StageError as failed:
             if not system.parameters.rubs:  # friction remembers its path
                 last = failed.branch.last.x if failed.branch.points else x
@@ -194,12 +196,12 @@ class ContactSolver:
         """From a state under any pressure to the sealed pressure."""
         problem = contact_problem(system, system.parameters.sealed_pressure)
         method, name = "pseudo-transient continuation", "creep to the contact"
-        stage = correction_stage(system, problem, method, name)
-        return replace(stage, corrector=CreepCorrector(system, self.driver.newton))
+        path_stage = correction_stage(system, problem, method, name)
+        return replace(path_stage, corrector=CreepCorrector(system, self.driver.newton))
 
-    def _follow(self, system: SealSystem, stage: Stage, x: Array) -> Array:
+    def _follow(self, system: SealSystem, path_stage: Stage, x: Array) -> Array:
         """To the end of a stage, by the corrector of paths."""
         p = system.parameters
         if p.solver == "auto" and not p.rubs:
-            stage = replace(stage, corrector=PressureNewton(self.driver.newton, system))
-        return self.driver.follow(stage, x)
+            path_stage = replace(path_stage, corrector=PressureNewton(self.driver.newton, system))
+        return self.driver.follow(path_stage, x)

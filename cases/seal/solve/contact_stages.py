@@ -50,22 +50,22 @@ def held_moment(p: Gland) -> float | None:
 
 
 def assembly(p: Seal) -> str:
-    """The way on which contact is found, in words: with friction the result depends on it."""
-    words = "squeezed with its mean place and rotation held"
+    """The way on which contact is found, in text: with friction the result depends on it."""
+    text = "squeezed with its mean place and rotation held"
     if p.sealed_pressure > 0.0:
-        words += ", moved to the wall of the air side"
+        text += ", moved to the wall of the air side"
     if p.rubs:
-        words += ", let go by a fading force and moment"
-    return words + (", loaded by the pressure from 0" if p.sealed_pressure > 0.0 else "")
+        text += ", let go by a fading force and moment"
+    return text + (", loaded by the pressure from 0" if p.sealed_pressure > 0.0 else "")
 
 
 def contact_problem(
-    system: SealSystem, sealed_pressure: float, place: float | None = None
+    system: SealSystem, sealed_pressure: float, position: float | None = None
 ) -> Problem:
-    """Contact under a sealed pressure; place: where the section is held, left out: as of a film."""
+    """Contact under a sealed pressure; position: of the section, left out: as of a film."""
     p = system.parameters
-    place = held_place(p) if place is None else place
-    loads = ContactLoads(sealed_pressure, {ROD: OFFSET}, place=place, moment=held_moment(p))
+    position = held_place(p) if position is None else position
+    loads = ContactLoads(sealed_pressure, {ROD: OFFSET}, position=position, moment=held_moment(p))
     return system.contact_problem(loads)
 
 
@@ -78,7 +78,7 @@ def approach_stage(system: SealSystem) -> Stage:
     def at(closed: float) -> Problem:
         left = 1.0 - closed
         offsets = {ROD: closed * OFFSET + left * rod_gap, BORE: left * housing_gap}
-        return system.contact_problem(ContactLoads(offsets=offsets, place=0.0))
+        return system.contact_problem(ContactLoads(offsets=offsets, position=0.0))
 
     return Stage("rod approach", at, lambda share: failure_messages.not_squeezed(p, share))
 
@@ -107,15 +107,15 @@ def release_stage(system: SealSystem, x: Array) -> Stage:
     return Stage("release", at, lambda _: failure_messages.not_released(p))
 
 
-def load_stage(system: SealSystem, begin: float = 0.0, place: float | None = None) -> Stage:
+def load_stage(system: SealSystem, begin: float = 0.0, position: float | None = None) -> Stage:
     """Last stage: the sealed pressure rises, from where it began before, MPa.
 
-    place: where the section is held as long as there is no pressure, mm.
+    position: where the section is held as long as there is no pressure, mm.
     """
     p = system.parameters
     return Stage(
         name="sealed pressure",
-        problem_at=lambda p_s: contact_problem(system, p_s, None if p_s > 0.0 else place),
+        problem_at=lambda p_s: contact_problem(system, p_s, None if p_s > 0.0 else position),
         ended=lambda reached: failure_messages.not_loaded(p, reached),
         start=begin,
         stop=p.sealed_pressure,

@@ -61,11 +61,11 @@ class PressureNewton:
         bare = problem if isinstance(problem, Problem) else problem.problem
         if self.pressures is None:
             self.pressures = self.system.element_pressures(x0)
-        held: NonlinearProblem = lagged(self.system, bare, self.pressures)
+        augmented: NonlinearProblem = lagged(self.system, bare, self.pressures)
         if isinstance(problem, Relaxed | Anchored):
-            held = Anchored(held, problem.term, problem.state)
+            augmented = Anchored(augmented, problem.term, problem.state)
         start = problem.admissible(x0) if isinstance(problem, Layered) else x0
-        solution = self.newton.solve(held, start)
+        solution = self.newton.solve(augmented, start)
         if solution.converged:
             self.pressures = self.system.element_pressures(solution.x)
         return solution
@@ -79,7 +79,7 @@ def film_corrector(p: Seal, linear: Condenser) -> SchurCorrector:
     """Modified Newton iterations on the Schur complement of the section, for films of a case."""
     inner = ModifiedNewton(max_inner=_CAVITIES) if p.conserving else ModifiedNewton()
     finish = Newton(max_iterations=1, linear=linear)
-    return SchurCorrector(linear, inner, near=_NEAR, finish=finish)
+    return SchurCorrector(linear, inner, threshold=_NEAR, finish=finish)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,19 +98,19 @@ class FilmCorrectors:
         fast = film_corrector(p, linear) if quick and isinstance(linear, Condenser) else None
         return cls(system, replace(newton, max_iterations=_MONOLITHIC), fast)
 
-    def whole(self, pressures: Array | None = None) -> PressureNewton:
+    def monolithic(self, pressures: Array | None = None) -> PressureNewton:
         """Solves for all unknowns; pressures: (Q,) of a state that another mesh has left."""
         return PressureNewton(self.newton, self.system, pressures)
 
     @property
     def first(self) -> Corrector:
         """Solves steady films from others near by."""
-        return self.fast or self.whole()
+        return self.fast or self.monolithic()
 
     def steady(self, pressures: Array | None = None) -> Corrector:
         """Solves the steady film from the last step in time; pressures: as of `whole`."""
         fast = (self.fast,) if self.fast else ()
-        return Ladder((*fast, self.whole(pressures)))
+        return Ladder((*fast, self.monolithic(pressures)))
 
     def steps(self, pressures: Array | None = None) -> Corrector:
         """Solves steps in time; pressures: as of `whole`."""

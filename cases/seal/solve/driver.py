@@ -60,7 +60,7 @@ def verdict_of_contact(system: SealSystem, x: Array) -> Verdict:
     return Verdict(
         float(contact_pressure(system, p.sealed_pressure, x).max()),
         fewest=fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes),
-        slopes=p.mesh != "uniform",
+        judge_slopes=p.mesh != "uniform",
         rough=p.rough,
         unsealed=unsealed(system, x),
         references=contact_peaks(system, p.sealed_pressure, x),
@@ -89,12 +89,12 @@ class Judge:
             error=error if p.error_estimate and p.mesh == "graded" else None,
             reservation=reservation(p, estimate) if adapted.fits else UNFIT,
         )
-        known = film.numbers.friction_known
+        friction_known = film.numbers.friction_known
         equations = film.system, film.problem, film.loads, film.x
         state = replace(
             film_state(*equations, verdict, film.solution.iterations),
             h_star_error_percent=error,
-            rod_friction_error_percent=estimate.friction if estimate and known else nan,
+            rod_friction_error_percent=estimate.friction if estimate and friction_known else nan,
         )
         if self.differentiate and differentiable(state):
             state = replace(state, sensitivity=self.differentiate(film))
@@ -142,13 +142,13 @@ class DryContact:
         self, stroke: Stroke, speed: float, last: Sequence[Adapted] = ()
     ) -> Adapted | NoFilm:
         """The film at |U|, mm/s, on a mesh that is made for it; last: films of the same stroke."""
-        found = None
+        result = None
         if last:
-            near = [adapted.film for adapted in last]
-            found = self.films.on(near[-1].system).from_neighbour(near, speed)
-        if not isinstance(found, Film):
-            found = self.film(stroke, speed)
-        return Adaptation(self.system.parameters, self.solver, self.films).adapted(found, last)
+            films = [adapted.film for adapted in last]
+            result = self.films.on(films[-1].system).from_neighbour(films, speed)
+        if not isinstance(result, Film):
+            result = self.film(stroke, speed)
+        return Adaptation(self.system.parameters, self.solver, self.films).adapted(result, last)
 
 
 def run(
@@ -173,13 +173,13 @@ def run(
     for stroke in strokes_of(parameters):
         last, missed = list[Adapted](), list[NoFilm]()
         for speed in parameters.speeds:
-            found = contact.adapted(stroke, speed, last[-2:])
-            if isinstance(found, NoFilm):
-                missed.append(found)
+            result = contact.adapted(stroke, speed, last[-2:])
+            if isinstance(result, NoFilm):
+                missed.append(result)
                 continue
-            states.append(judge.state(found, last[-1].film.numbers if last else None))
+            states.append(judge.state(result, last[-1].film.numbers if last else None))
             observer.film_state(states[-1])
-            last.append(found)
+            last.append(result)
         if missed:
             failures.append(without_films(missed, parameters))
     numbers = contact_numbers(contact.system, contact.x)

@@ -51,8 +51,8 @@ _HIGH = 1.5  # shear moduli
 
 def not_squeezed(p: Gland, share: float) -> str:
     """Rod and housing came this share of their way, 0 to 1."""
-    way = f"only {100.0 * share:.0f} % of the way"
-    return f"{_ring(p)} can be pressed into its gland ({_gland(p)}) {way}; {_GLAND}"
+    progress = f"only {100.0 * share:.0f} % of the way"
+    return f"{_ring(p)} can be pressed into its gland ({_gland(p)}) {progress}; {_GLAND}"
 
 
 def not_released(p: Gland) -> str:
@@ -100,8 +100,8 @@ def without_films(missed: Sequence[NoFilm], p: Seal) -> tuple[Status, str]:
     """Status and message of a stroke that lacks the films of these speeds."""
     first, speeds = missed[0], ", ".join(f"{film.speed:g}" for film in missed)
     advice = ROLLING if p.rotation == "free" else _film_advice(p)
-    words = f"{first.stroke}stroke: no film was found at {speeds} mm/s; {advice}"
-    return first.status, f"{words}; the solver says: {first.message}"
+    message = f"{first.stroke}stroke: no film was found at {speeds} mm/s; {advice}"
+    return first.status, f"{message}; the solver says: {first.message}"
 
 
 def _film_advice(p: Seal) -> str:

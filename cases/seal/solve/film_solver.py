@@ -63,7 +63,7 @@ class Film:
         return self.squeeze_film.film
 
     @property
-    def begun(self) -> tuple[SqueezeFilm, TransientState]:
+    def start_state(self) -> tuple[SqueezeFilm, TransientState]:
         """The moment from which it is squeezed out where it is not found at once."""
         return self.squeeze_film, TransientState(self.x, FIRST, 1.0)
 
@@ -82,14 +82,14 @@ class Film:
 class NoFilm:
     """Why there is no film at a speed.
 
-    begun: how it was squeezed out, and how far, where it took a step.
+    start_state: how it was squeezed out, and how far, where it took a step.
     """
 
     stroke: Stroke
     speed: float
     status: Status
     message: str
-    begun: tuple[SqueezeFilm, TransientState] | None = None
+    start_state: tuple[SqueezeFilm, TransientState] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +111,8 @@ class FilmSolver:
         """The film at |U|, mm/s, squeezed out from the contact state x (n,)."""
         scales = InletScales.of(self.system, stroke, speed, x)
         if scales is None:
-            words = "too few nodes touch the rod to show the edge of the contact"
-            return NoFilm(stroke, speed, Status.DIVERGED, words)
+            message = "too few nodes touch the rod to show the edge of the contact"
+            return NoFilm(stroke, speed, Status.DIVERGED, message)
         film = film_loads(self.system, stroke, speed, x)
         layer, moment = film_layer(self.system, x), self.system.moment(x)
         squeeze_film = SqueezeFilm(self.system, layer, film, scales, x, moment)
@@ -127,8 +127,8 @@ class FilmSolver:
         """
         film, correctors = last[-1], last[-1].correctors
         squeeze_film, before = film.squeeze_film.at(speed), [film.x]
-        known = [Point(f.loads.speed**POWER, f.solution) for f in last if f.system is film.system]
-        start, stop = known[-1].parameter, speed**POWER
+        points = [Point(f.loads.speed**POWER, f.solution) for f in last if f.system is film.system]
+        start, stop = points[-1].parameter, speed**POWER
         log = self._log(squeeze_film)
 
         def problem_at(t: float) -> NonlinearProblem:
@@ -140,11 +140,11 @@ class FilmSolver:
             log.step(point.solution)
             before[0] = point.solution.x
 
-        span, least = abs(stop - start), _LEAST * max(start, stop)
+        span, minimum = abs(stop - start), _LEAST * max(start, stop)
         usual = 2 * StepRule.target_iterations  # modified ones, two for one of Newton's
-        rule = StepRule(span, min(least, span), target_iterations=usual)
+        rule = StepRule(span, min(minimum, span), target_iterations=usual)
         path = Continuation(correctors.first, rule, name="U^0.6")
-        previous = known[-2] if len(known) > 1 else None
+        previous = points[-2] if len(points) > 1 else None
         branch = path.follow(problem_at, start, stop, film.x, on_point=tell, previous=previous)
         log.end(branch)
         x = branch.last.x if branch.points else film.x
@@ -159,22 +159,22 @@ class FilmSolver:
         """
         correctors = FilmCorrectors.of(self.system, self.driver.newton)
         log = self._log(carried)
-        found = correctors.whole(pressures).solve(carried.steady(start.x), start.x)
-        log.step(found)
-        log.end(found)
-        return self._reached(carried, found, start, correctors, pressures)
+        result = correctors.monolithic(pressures).solve(carried.steady(start.x), start.x)
+        log.step(result)
+        log.end(result)
+        return self._reached(carried, result, start, correctors, pressures)
 
     def _reached(
         self,
         squeeze_film: SqueezeFilm,
-        found: Solution,
+        result: Solution,
         start: TransientState,
         correctors: FilmCorrectors,
         pressures: Array | None = None,
     ) -> Film | NoFilm:
         """The film that was found, if there is one and it is admissible; else see `_followed`."""
-        if found.converged and squeeze_film.change(start.x, found.x) < inf:
-            return self._entered(squeeze_film, correctors, found)
+        if result.converged and squeeze_film.change(start.x, result.x) < inf:
+            return self._entered(squeeze_film, correctors, result)
         return self._followed(squeeze_film, start, correctors, pressures)
 
     def _followed(
@@ -195,17 +195,17 @@ class FilmSolver:
         log.end(branch)
         if branch.converged:
             return self._entered(squeeze_film, correctors, branch.last)
-        begun = None if reached is start else (squeeze_film, reached)
-        return NoFilm(film.stroke, film.speed, branch.status, branch.message, begun)
+        start_state = None if reached is start else (squeeze_film, reached)
+        return NoFilm(film.stroke, film.speed, branch.status, branch.message, start_state)
 
     def _entered(
-        self, squeeze_film: SqueezeFilm, correctors: FilmCorrectors, found: Solution
+        self, squeeze_film: SqueezeFilm, correctors: FilmCorrectors, result: Solution
     ) -> Film:
         """The film, with the pressure of the wedge before its arc where it lacks much of it.
 
         Without it where no such film is found.
         """
-        film = Film(squeeze_film, found, correctors)
+        film = Film(squeeze_film, result, correctors)
         if not film.numbers.enters:
             return film
         more = replace(squeeze_film, film=replace(film.loads, entrance=film.numbers.entrance))

@@ -65,5 +65,5 @@ def film_thickness(p: Seal, edges: Sequence[Edge], speed: float) -> float:
 def inlet_edge(system: SealSystem, stroke: Stroke, x: Array) -> Edge | None:
     """The edge of the contact x (n,) where a stroke draws its film in; None without one."""
     edges = contact_edges(system, x)
-    found = edges[0 if stroke == "out" else -1] if edges else None
-    return found if found and 0.0 < found.rise < inf else None
+    edge = edges[0 if stroke == "out" else -1] if edges else None
+    return edge if edge and 0.0 < edge.rise < inf else None

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from softehl.cases.seal.states.state import Observer, StageRecord, place
+from softehl.cases.seal.states.state import Observer, StageRecord, operating_point
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.continuation import Continuation, StepRule
@@ -43,27 +43,27 @@ class Stage:
 
     def fraction(self, parameter: float) -> float:
         """Share of the way, 0 to 1."""
-        way = self.stop - self.start
-        return (parameter - self.start) / way if way else 1.0
+        length = self.stop - self.start
+        return (parameter - self.start) / length if length else 1.0
 
 
 @dataclass(eq=False)
 class StageError(Exception):
     """A stage that did not reach its end. records: what all stages have cost; it grows."""
 
-    stage: Stage
+    load_stage: Stage
     branch: Branch
     records: Sequence[StageRecord] = ()
 
     def __str__(self) -> str:
         """Words on how far the stage came, and what may help."""
-        return self.stage.ended(self.reached)
+        return self.load_stage.ended(self.reached)
 
     @property
     def reached(self) -> float:
         """Parameter of the last state; of the beginning, if there is none."""
         points = self.branch.points
-        return points[-1].parameter if points else self.stage.start
+        return points[-1].parameter if points else self.load_stage.start
 
 
 @dataclass
@@ -78,28 +78,32 @@ class PathDriver:
     newton: Newton = field(default_factory=lambda: Newton(max_iterations=10))
     records: list[StageRecord] = field(default_factory=list)
 
-    def follow(self, stage: Stage, x0: Array) -> Array:
+    def follow(self, load_stage: Stage, x0: Array) -> Array:
         """Unknowns (n,) at the end of a stage that begins with a solution near x0 (n,).
 
         A wall's friction is that of the way since the step before, in the first one since x0.
         Raises StageError.
         """
-        log = StageLog(self, stage.name, stage.sealed_pressure, "both", stage.method)
-        before = [x0]
+        log = StageLog(self, load_stage.name, load_stage.sealed_pressure, "both", load_stage.method)
+        previous = [x0]
 
         def problem_at(parameter: float) -> NonlinearProblem:
-            problem = stage.problem_at(parameter)
-            return problem.since(before[0]) if isinstance(problem, Problem) else problem
+            problem = load_stage.problem_at(parameter)
+            return problem.since(previous[0]) if isinstance(problem, Problem) else problem
 
         def report(point: Point) -> None:
-            log.step(point.solution, point.parameter, stage.fraction(point.parameter))
-            before[0] = point.solution.x
-            if stage.on_point:
-                stage.on_point(point)
+            log.step(point.solution, point.parameter, load_stage.fraction(point.parameter))
+            previous[0] = point.solution.x
+            if load_stage.on_point:
+                load_stage.on_point(point)
 
-        continuation = Continuation(stage.corrector or self.newton, stage.steps, name=stage.name)
-        branch = continuation.follow(problem_at, stage.start, stage.stop, x0, on_point=report)
-        failed = None if branch.converged else StageError(stage, branch, self.records)
+        continuation = Continuation(
+            load_stage.corrector or self.newton, load_stage.steps, name=load_stage.name
+        )
+        branch = continuation.follow(
+            problem_at, load_stage.start, load_stage.stop, x0, on_point=report
+        )
+        failed = None if branch.converged else StageError(load_stage, branch, self.records)
         log.end(branch, f"; ended: {branch.message}" if failed else "")
         if failed:
             raise failed
@@ -120,7 +124,7 @@ class StageLog:
     method: str
     parameters: list[float] = field(default_factory=list)
     histories: list[tuple[float, ...]] = field(default_factory=list)
-    begun: float = field(default_factory=time.perf_counter)
+    start_time: float = field(default_factory=time.perf_counter)
 
     def __post_init__(self) -> None:
         """Tell that it begins."""
@@ -147,12 +151,12 @@ class StageLog:
         self.driver.records.append(
             StageRecord(
                 name=self.name,
-                seconds=time.perf_counter() - self.begun,
+                seconds=time.perf_counter() - self.start_time,
                 factorisations=spent.factorisations,
                 iterations=spent.iterations,
                 residual_histories=tuple(self.histories),
                 parameters=tuple(self.parameters),
-                where=place(self.sealed_pressure, self.stroke),
+                where=operating_point(self.sealed_pressure, self.stroke),
                 method=self.method + ended,
             )
         )

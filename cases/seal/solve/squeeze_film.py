@@ -59,10 +59,10 @@ def film_layer(system: SealSystem, x: Array) -> Layer:
     moved = system.numbering.at(MOVED, system.mesh.arc_nodes[:, None]).ravel()
     moment = system.layout.dofs(ROTATION)
     shared = np.concatenate([moved, moment, _walls_of_arc(system, x)])
-    own = [system.layout.dofs(field.name) for field in system.film_fields()]
-    inner = np.concatenate(own)
+    film_dofs = [system.layout.dofs(field.name) for field in system.film_fields()]
+    inner = np.concatenate(film_dofs)
     if system.parameters.conserving:  # side by side along the film: their matrix is a band
-        inner = np.stack([pressures[1:-1] for pressures in own], axis=1).ravel()
+        inner = np.stack([pressures[1:-1] for pressures in film_dofs], axis=1).ravel()
     inner = inner[~np.isin(inner, system.film_ends)]
     names = [block.name for block in system.blocks if block.on_arc]
     return Layer.of(system.problem.assembler, names, shared, inner)
@@ -70,14 +70,14 @@ def film_layer(system: SealSystem, x: Array) -> Layer:
 
 def _walls_of_arc(system: SealSystem, x: Array) -> Integers:
     """Multipliers (n,) of the walls at those nodes of the arc that touch them or are near."""
-    found = []
+    multipliers = []
     for name in (SEALED_WALL, AIR_WALL):
         nodes = system.section.chains[WALLS[name]][0]
         gap = system.obstacles[name].gap(system.deformed(x)[nodes])
-        near = np.isin(nodes, system.mesh.arc_nodes)
-        near &= gap < _AT_WALL * system.parameters.section_diameter
-        found.append(system.layout.dofs(name)[near])
-    return np.concatenate(found)
+        selected = np.isin(nodes, system.mesh.arc_nodes)
+        selected &= gap < _AT_WALL * system.parameters.section_diameter
+        multipliers.append(system.layout.dofs(name)[selected])
+    return np.concatenate(multipliers)
 
 
 def film_loads(system: SealSystem, stroke: Stroke, speed: float, x: Array) -> FilmLoads:
@@ -89,7 +89,7 @@ def film_loads(system: SealSystem, stroke: Stroke, speed: float, x: Array) -> Fi
         speed,
         gap=system.arc_film(x)[1],
         shear=1.0 if p.shear_traction else 0.0,
-        place=held_place(p),
+        position=held_place(p),
         moment=0.0 if p.rotation == "free" else held_moment(p),
     )
 
@@ -120,31 +120,31 @@ class SqueezeFilm:
         film = replace(self.film, gap=system.arc_film(x)[1] + OFFSET, entrance=0.0)
         return replace(self, system=system, layer=film_layer(system, x), film=film, dry=dry)
 
-    def step(self, before: Array, tau: float, load: float) -> Relaxed:
+    def step(self, previous: Array, tau: float, load: float) -> Relaxed:
         """See `Transient`; the load is the shear stress of the film."""
         film = replace(self.film, shear=load * self.film.shear)
         if self.system.parameters.rotation == "free":
             film = replace(film, moment=(1.0 - load) * self.moment)
         return Relaxed(
-            self.system.film_problem(film).since(before),
+            self.system.film_problem(film).since(previous),
             self.layer,
             (self.system.film_guard(),),
-            hold=self._masses(before),
-            state=before,
+            hold=self._masses(previous),
+            state=previous,
             rate=-1.0 / (tau * self.scales.time),
         )
 
-    def steady(self, before: Array) -> Layered:
+    def steady(self, previous: Array) -> Layered:
         """The equations of the steady film, from a state (n,) near by."""
-        problem = self.system.film_problem(self.film).since(before)
+        problem = self.system.film_problem(self.film).since(previous)
         return Layered(problem, self.layer, (self.system.film_guard(),))
 
-    def change(self, before: Array, after: Array) -> float:
+    def change(self, previous: Array, after: Array) -> float:
         """Largest change of ln h along the arc; of h over its size between rough surfaces."""
-        (_, h), (_, k) = self.system.arc_film(before), self.system.arc_film(after)
+        (_, h), (_, k) = self.system.arc_film(previous), self.system.arc_film(after)
         if self.system.parameters.rough:
-            least = self.system.parameters.surfaces.sigma
-            return float(np.max(np.abs(k - h) / np.maximum(np.abs(h), least)))
+            minimum = self.system.parameters.surfaces.sigma
+            return float(np.max(np.abs(k - h) / np.maximum(np.abs(h), minimum)))
         return float(np.abs(np.log(k / h)).max()) if k.min() > 0.0 else inf
 
     @property
@@ -194,8 +194,8 @@ def gap_masses(system: SealSystem, x: Array, weights: Array | None = None) -> cs
     if weights is not None:
         masses = masses * np.stack([weights[:-1], weights[1:]], axis=1)[:, None, :]
     at = np.broadcast_arrays(pressures[..., None], radii[:, None])
-    places = tuple(part.ravel() for part in at)
-    return csc_array(coo_array((masses.ravel(), places), shape=(n, n)))
+    indices = tuple(part.ravel() for part in at)
+    return csc_array(coo_array((masses.ravel(), indices), shape=(n, n)))
 
 
 def _shapes(order: int) -> Array:

@@ -60,11 +60,11 @@ def carried_unknowns(old: SealSystem, new: SealSystem, x: Array) -> Array:
         if field.on == "nodes":
             values = transfer_nodes(*meshes, values.reshape(-1, 2)).ravel()
         elif field.on != "section":
-            here, there = (system.section.chains[field.on][0] for system in (old, new))
-            if len(here) == len(old.mesh.boundary):
+            old_nodes, new_nodes = (system.section.chains[field.on][0] for system in (old, new))
+            if len(old_nodes) == len(old.mesh.boundary):
                 values = transfer_boundary(*meshes, values)
             else:
-                values = transfer_chain(*meshes, here, there, values)
+                values = transfer_chain(*meshes, old_nodes, new_nodes, values)
         y[new.layout.part(field.name)] = values
     return y
 
@@ -84,59 +84,61 @@ class FilmTransfer:
         inside, mesh = self._inside, self.new.mesh
         miss = np.zeros((len(mesh.points), 1))
         carried = self.new.arc_film(y)[1][inside]
-        miss[mesh.arc_nodes[inside], 0] = self._thickness(x, self._places[inside]) - carried
+        miss[mesh.arc_nodes[inside], 0] = self._thickness(x, self._positions[inside]) - carried
         self.new.displacements(y)[:, 1] += potential(mesh, miss)[:, 0]
         return y
 
     def pressures(self, x: Array) -> Array:
         """Mean stresses (Q',) of the elements."""
         change = self.old.element_pressures(x) - self.old.element_pressures(self.dry[0])
-        there = self.new.element_pressures(self.dry[1])
-        return there + transfer_elements(self.old.mesh, self.new.mesh, change)
+        contact_pressures = self.new.element_pressures(self.dry[1])
+        return contact_pressures + transfer_elements(self.old.mesh, self.new.mesh, change)
 
-    def _thickness(self, x: Array, places: Array) -> Array:
+    def _thickness(self, x: Array, positions: Array) -> Array:
         """Film thickness (n,) at places (n,) on the old arc."""
-        h, before = self.old.arc_film(x)[1], self.old.section.places
+        h, old_positions = self.old.arc_film(x)[1], self.old.section.positions
         if self.old.parameters.rough:  # which may interpenetrate
-            return np.asarray(PchipInterpolator(before, h)(places))
-        return np.asarray(np.exp(PchipInterpolator(before, np.log(h))(places)))
+            return np.asarray(PchipInterpolator(old_positions, h)(positions))
+        return np.asarray(np.exp(PchipInterpolator(old_positions, np.log(h))(positions)))
 
     def _film(self, x: Array, y: Array) -> None:
         """Write the film pressures of x (n,) into y (n',).
 
         Each segment takes them from that of the old mesh in which it is.
         """
-        nodes, places = pressure_nodes(self.new.parameters.pressure_order), self._places
-        at = places[:-1, None] + np.diff(places)[:, None] * (0.5 * (1.0 + nodes))
-        segment, weights = modes_at(self.old.section.places, nodes, at)
+        nodes, positions = pressure_nodes(self.new.parameters.pressure_order), self._positions
+        at = positions[:-1, None] + np.diff(positions)[:, None] * (0.5 * (1.0 + nodes))
+        segment, weights = modes_at(self.old.section.positions, nodes, at)
         for film in self.old.film_fields():
             rows = x[self.old.pressure_dofs(film.name)]
             y[self.new.pressure_dofs(film.name)] = np.einsum("skm,skm->sk", weights, rows[segment])
 
     @cached_property
-    def _places(self) -> Array:
+    def _positions(self) -> Array:
         """Places (arc nodes,) of the new arc on the old one, mm; beyond its ends outside."""
-        before, after = (s.mesh for s in (self.old, self.new))
+        old_mesh, after = (s.mesh for s in (self.old, self.new))
         turn = after.length
-        way = (after.places[0] - before.places[0] + 0.5 * turn) % turn - 0.5 * turn
-        places = way + self.new.section.places
-        ends = self.old.section.places[[0, -1]]
-        near = 1e-9 * turn
-        places[np.abs(places - ends[0]) < near] = ends[0]
-        places[np.abs(places - ends[1]) < near] = ends[1]
-        return np.asarray(places)
+        shift = (after.positions[0] - old_mesh.positions[0] + 0.5 * turn) % turn - 0.5 * turn
+        positions = shift + self.new.section.positions
+        end_positions = self.old.section.positions[[0, -1]]
+        tolerance = 1e-9 * turn
+        positions[np.abs(positions - end_positions[0]) < tolerance] = end_positions[0]
+        positions[np.abs(positions - end_positions[1]) < tolerance] = end_positions[1]
+        return np.asarray(positions)
 
     @property
     def _inside(self) -> Flags:
-        first, last = self.old.section.places[[0, -1]]
-        return np.asarray((self._places >= first) & (self._places <= last))
+        first, last = self.old.section.positions[[0, -1]]
+        return np.asarray((self._positions >= first) & (self._positions <= last))
 
 
-def modes_at(before: Array, nodes: Array, at: Array) -> tuple[Integers, Array]:
+def modes_at(old_positions: Array, nodes: Array, at: Array) -> tuple[Integers, Array]:
     """Segment (s, m) of an arc with nodes at these places that holds a place, (s, m); its modes
     there, (s, m, n). nodes: (n,) parent coordinates of its pressures.
     """
-    segment = np.clip(np.searchsorted(before, at, side="right") - 1, 0, len(before) - 2)
-    local = 2.0 * (at - before[segment]) / np.diff(before)[segment] - 1.0
+    segment = np.clip(
+        np.searchsorted(old_positions, at, side="right") - 1, 0, len(old_positions) - 2
+    )
+    local = 2.0 * (at - old_positions[segment]) / np.diff(old_positions)[segment] - 1.0
     modes = lagrange(nodes, np.clip(local.ravel(), -1.0, 1.0))[:, :, 0]
     return segment, modes.reshape(*segment.shape, -1)

@@ -33,20 +33,20 @@ From 1e-5 to 1e-2 the films of an X-ring, a U-cup and a square ring are the same
 class Edge:
     """An edge of the contact: its place on the arc, mm, and K^2 of its pressure, MPa^2/mm."""
 
-    place: float
+    position: float
     rise: float
 
 
-def groups(h: Array, inside: Flags, apart: float = CONTACT_FILM) -> list[Integers]:
+def groups(h: Array, inside: Flags, separation: float = CONTACT_FILM) -> list[Integers]:
     """The nodes (n,) of each contact: those inside it, where h (nodes,) between them stays low.
 
-    apart: what h exceeds between two contacts, mm.
+    separation: what h exceeds between two contacts, mm.
     """
     nodes = np.flatnonzero(inside)
     cuts = [
         k + 1
         for k, (a, b) in enumerate(pairwise(nodes))
-        if b > a + 1 and h[a + 1 : b].max() > apart
+        if b > a + 1 and h[a + 1 : b].max() > separation
     ]
     return [part for part in np.split(nodes, cuts) if len(part)]
 
@@ -63,8 +63,8 @@ def contact_film(h: Array, lobes: int = 1) -> float:
     would be one, with an inlet and an exit in its middle.
     """
     usual, thin = contact_level(h), GROOVE * float(h.min())
-    whole, parted = (len(groups(h, h < level, level)) for level in (usual, thin))
-    return thin if whole < lobes == parted else usual
+    single, parted = (len(groups(h, h < level, level)) for level in (usual, thin))
+    return thin if single < lobes == parted else usual
 
 
 def contacts(system: SealSystem, x: Array) -> list[Integers]:
@@ -79,14 +79,14 @@ def contact_edges(system: SealSystem, x: Array) -> list[Edge]:
     The square of the pressure is a straight line there, taken from the second and third node that
     touch; none where fewer than three do. Two edges of each contact, from the sealed side on.
     """
-    s, squares = system.section.places, system.rod_multipliers(x) ** 2
-    flat, found = system.section.layout.flat, list[Edge]()
+    s, squares = system.section.positions, system.rod_multipliers(x) ** 2
+    flat, edges = system.section.layout.flat, list[Edge]()
     for touching in contacts(system, x):
         for out, i in ((-1, touching), (1, touching[::-1])):
             if len(i) >= 3:
                 outside = s[min(max(i[0] + out, 0), len(s) - 1)]
-                found.append(_edge(s[i[:3]], squares[i[1:3]], outside if flat else None))
-    return found
+                edges.append(_edge(s[i[:3]], squares[i[1:3]], outside if flat else None))
+    return edges
 
 
 def _edge(s: Array, squares: Array, outside: float | None) -> Edge:
@@ -97,11 +97,11 @@ def _edge(s: Array, squares: Array, outside: float | None) -> Edge:
     between this node and the first, as steep as it must be for the second.
     """
     slope = (squares[1] - squares[0]) / (s[2] - s[1])
-    place = s[1] - squares[0] / slope
-    if outside is not None and not min(outside, s[0]) <= place <= max(outside, s[0]):
-        place = 0.5 * (outside + s[0])
-        slope = squares[0] / (s[1] - place)
-    return Edge(float(place), abs(float(slope)))
+    position = s[1] - squares[0] / slope
+    if outside is not None and not min(outside, s[0]) <= position <= max(outside, s[0]):
+        position = 0.5 * (outside + s[0])
+        slope = squares[0] / (s[1] - position)
+    return Edge(float(position), abs(float(slope)))
 
 
 def contact_state(system: SealSystem, x: Array) -> ContactState:
@@ -145,9 +145,9 @@ def overlap(system: SealSystem, x: Array) -> str:
     beyond the film.
     """
     deformed = system.deformed(x)
-    place = crossing(deformed[system.mesh.boundary])
-    if place is not None:
-        return f"into itself at z = {place[0]:.3g}, r = {place[1]:.4g} mm"
+    point = crossing(deformed[system.mesh.boundary])
+    if point is not None:
+        return f"into itself at z = {point[0]:.3g}, r = {point[1]:.4g} mm"
     z, r = deformed[system.mesh.outer_nodes].T
     within = int(np.argmin(r))
     if r[within] < system.rod_radius:
@@ -190,8 +190,8 @@ def mean_motion(system: SealSystem, x: Array) -> dict[str, float]:
     """Mean rotation of the section, from z towards r, and mean axial displacement."""
     residuals = {}
     for name in ("rotation", "hold"):
-        block, given = system.problem.assembler.block(name), system.problem.parameters[name]
-        residuals[name] = float(block.residual(x, given)[:, -1].sum())
+        block, values = system.problem.assembler.block(name), system.problem.parameters[name]
+        residuals[name] = float(block.residual(x, values)[:, -1].sum())
     return {
         "mean_rotation_degrees": system.side * float(np.degrees(residuals["rotation"])),
         "mean_place_mm": residuals["hold"],

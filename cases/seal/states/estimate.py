@@ -70,8 +70,8 @@ class Estimate:
     def friction_bound(self) -> float:
         """Largest error of friction, by its two parts."""
         parts = [(k.drag, k.friction - k.drag) for k in (self.film, self.other)]
-        apart = fsum(abs(a - b) for a, b in zip(*parts, strict=True))
-        return self._factor * apart / abs(self.film.friction)
+        difference = fsum(abs(a - b) for a, b in zip(*parts, strict=True))
+        return self._factor * difference / abs(self.film.friction)
 
     @property
     def beyond(self) -> float:
@@ -108,9 +108,9 @@ def unseen(p: Seal) -> str:
 
 def reservation(p: Seal, estimate: Estimate | None) -> str:
     """Why a state whose estimated error of h* is small is not `ok` all the same; empty if it is."""
-    words = unseen(p) if p.error_estimate else ""
-    if words or estimate is None:
-        return words
+    text = unseen(p) if p.error_estimate else ""
+    if text or estimate is None:
+        return text
     other = estimate.other
     fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
     if other.short(fewest) or not shows_inlet(other.inlet_ratio):

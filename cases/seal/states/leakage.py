@@ -37,11 +37,11 @@ class LeakageRow(Record):
 
 def net_leakage(rows: Sequence[FilmRow]) -> list[LeakageRow]:
     """A row for each sealed pressure and speed that has both strokes, fast ones first."""
-    found = {(row.sealed_pressure_MPa, row.rod_speed_mm_s): row for row in rows}
+    rows_by_point = {(row.sealed_pressure_MPa, row.rod_speed_mm_s): row for row in rows}
     pairs = [
-        (row, found[p, -speed])
-        for (p, speed), row in found.items()
-        if speed > 0.0 and (p, -speed) in found
+        (row, rows_by_point[p, -speed])
+        for (p, speed), row in rows_by_point.items()
+        if speed > 0.0 and (p, -speed) in rows_by_point
     ]
     pairs.sort(key=lambda pair: pair[0].order)
     return [_cycle(out, back) for out, back in pairs]

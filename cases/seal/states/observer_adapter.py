@@ -16,7 +16,7 @@ from softehl.cases.seal.states.state import (
     Observer,
     Profile,
     Section,
-    place,
+    operating_point,
 )
 from softehl.runtime.io import number_text, read_columns, read_vtu
 
@@ -30,7 +30,7 @@ class ObserverAdapter(Observer):
     def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
         """See :class:`Observer`."""
         title = f"{name}, p_s = {sealed_pressure:g} MPa, stroke {stroke}"
-        self.to.stage(name, title=title, where=place(sealed_pressure, stroke))
+        self.to.stage(name, title=title, where=operating_point(sealed_pressure, stroke))
 
     def step(self, **step: Unpack[harness.Step]) -> None:
         """See :class:`Observer`."""

@@ -68,11 +68,11 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         for tau in (0.5 * (at["tau_rod"] + at["tau"]), at["tau_rod"])
     )
     flow = float(film.along(at["eta"].ravel())[0]) * film.speed
-    before = wedge(system, film.stroke, x)
-    behind = wedge(system, "in" if film.stroke == "out" else "out", x)
-    entrance = built_up(*before, flow, h_star)
-    sliding, rubbed = wedge_friction(system, *before, flow, h_star)
-    beyond = wedge_friction(system, *behind, flow, h_star)[0]  # no pressure is built up there
+    inlet_wedge = wedge(system, film.stroke, x)
+    exit_wedge = wedge(system, "in" if film.stroke == "out" else "out", x)
+    entrance = built_up(*inlet_wedge, flow, h_star)
+    sliding, rubbed = wedge_friction(system, *inlet_wedge, flow, h_star)
+    beyond = wedge_friction(system, *exit_wedge, flow, h_star)[0]  # no pressure is built up there
     if film.entrance:
         drag += copysign(sliding, film.rod_speed)
         friction += copysign(rubbed, film.rod_speed)
@@ -110,13 +110,13 @@ def _flux(
     of (23) at its facets, which (21) and (22) make constant. The spread is taken over the
     neighbours on both sides up to where the film cavitates, eqs. (16) and (25).
     """
-    around, whole = slice(top, top + 1), run_around(at["p"].min(axis=1) >= 0.0, top)
+    around, full_film = slice(top, top + 1), run_around(at["p"].min(axis=1) >= 0.0, top)
     flux, jump = element_means(at["flux"], at["dx"]), 0.0
     if system.parameters.reynolds == "dg":
         facets = problem.fields(FACET, x)
         flux, jump = facets["flux"][:, 0], float(np.abs(facets["jump"]).max())
-        around, whole = (slice(max(k.start - 1, 0), k.stop) for k in (around, whole))
-    return float(flux[around].mean()), relative_spread(flux[whole]), jump
+        around, full_film = (slice(max(k.start - 1, 0), k.stop) for k in (around, full_film))
+    return float(flux[around].mean()), relative_spread(flux[full_film]), jump
 
 
 def parted_fluxes(at: Mapping[str, Array]) -> tuple[float, ...]:
@@ -126,15 +126,19 @@ def parted_fluxes(at: Mapping[str, Array]) -> tuple[float, ...]:
     is below zero. Parts with less than `LARGEST_ERROR` per cent of both load and friction are left
     out, as behind the exit: their oil changes neither by more. None of a film with one part.
     """
-    whole = np.flatnonzero(at["p"].min(axis=1) >= 0.0)
-    parts = [part for part in np.split(whole, np.flatnonzero(np.diff(whole) > 1) + 1) if len(part)]
-    shares = [np.abs(at[name] * at["dx"]).sum(axis=1) for name in ("p", "tau_rod")]
-    least = 0.01 * LARGEST_ERROR
-    found = [part for part in parts if any(v[part].sum() > least * v.sum() for v in shares)]
-    if len(found) < 2:
+    full_film = np.flatnonzero(at["p"].min(axis=1) >= 0.0)
+    parts = [
+        part
+        for part in np.split(full_film, np.flatnonzero(np.diff(full_film) > 1) + 1)
+        if len(part)
+    ]
+    fractions = [np.abs(at[name] * at["dx"]).sum(axis=1) for name in ("p", "tau_rod")]
+    minimum = 0.01 * LARGEST_ERROR
+    selected = [part for part in parts if any(v[part].sum() > minimum * v.sum() for v in fractions)]
+    if len(selected) < 2:
         return ()
     flux = element_means(at["flux"], at["dx"])
-    return tuple(float(flux[part[int(at["p"][part].max(axis=1).argmax())]]) for part in found)
+    return tuple(float(flux[part[int(at["p"][part].max(axis=1).argmax())]]) for part in selected)
 
 
 def film_parts(h: Array, level: float = CONTACT_FILM) -> list[slice]:
@@ -143,8 +147,8 @@ def film_parts(h: Array, level: float = CONTACT_FILM) -> list[slice]:
     h: (nodes,). level: of `contact_film`. Contacts are parted where the film between them is
     thickest.
     """
-    found = groups(h, h < level, level)
-    between = [(a[-1], b[0]) for a, b in pairwise(found)]
+    contacts = groups(h, h < level, level)
+    between = [(a[-1], b[0]) for a, b in pairwise(contacts)]
     cuts = [0, *(int(a + np.argmax(h[a : b + 1])) for a, b in between), len(h) - 1]
     return [slice(a, b) for a, b in pairwise(cuts)]
 
@@ -184,11 +188,11 @@ def _contacts(
     level: float,
 ) -> tuple[ContactNumbers, ...]:
     """Each contact of a film that has several; nodes: z and h at them, level: of `contact_film`."""
-    flux, found = element_means(at["flux"], at["dx"]), []
+    flux, numbers = element_means(at["flux"], at["dx"]), []
     for part in parts:
         z, h = (values[_nodes(part)] for values in nodes)
         start, end = interval_below(z, h, level)
-        found.append(
+        numbers.append(
             ContactNumbers(
                 flux=float(flux[_top(at, part)]),
                 p_max=float(at["p"][part].max()),
@@ -199,7 +203,7 @@ def _contacts(
                 inlet_ratio=filled_ratio({name: v[part] for name, v in at.items()}, film),
             )
         )
-    return tuple(found)
+    return tuple(numbers)
 
 
 def filled_ratio(at: Mapping[str, Array], film: FilmLoads) -> float:
@@ -208,14 +212,14 @@ def filled_ratio(at: Mapping[str, Array], film: FilmLoads) -> float:
     at: fields of its part of the film, (segments, points) each. nan too where they do not say
     whether oil is missing, and over a lobe that is lifted.
     """
-    whole = slice(0, len(at["p"]))
+    segments = slice(0, len(at["p"]))
     void = at.get("v_out" if film.stroke == "out" else "v_in")
-    if void is None or _lifted(at, whole, film.stroke):
+    if void is None or _lifted(at, segments, film.stroke):
         return nan
-    top = _top(at, whole)
+    top = _top(at, segments)
     h_star = float(element_means(at["flux"], at["dx"])[top] / (0.5 * film.rod_speed))
-    before = slice(None, top + 1) if film.stroke == "out" else slice(top, None)
-    torn = at["h"][before][void[before] > _TORN]
+    upstream = slice(None, top + 1) if film.stroke == "out" else slice(top, None)
+    torn = at["h"][upstream][void[upstream] > _TORN]
     if len(torn) and float(torn.min()) < INLET[0] * h_star:
         return nan
     return inlet_ratio(at, film, h_star)

@@ -27,18 +27,20 @@ DOUBTS = {
 """Verdict of a state that is kept but is not ok -> what is to be known of it."""
 
 
-def doubts(rows: Sequence[FilmRow], advice: Mapping[float, str]) -> dict[str, list[FilmRow]]:
+def reservations(rows: Sequence[FilmRow], advice: Mapping[float, str]) -> dict[str, list[FilmRow]]:
     """Advice for states that are not ok -> these states, worst first.
 
     advice: what states came with, by U: why one is clipped or uncertain, other than by its error.
     """
-    found: dict[str, list[FilmRow]] = {}
+    rows_by_reservation: dict[str, list[FilmRow]] = {}
     for word in DOUBTS:
         for row in rows:
             if row.verdict == word:
-                own = advice.get(row.key) if word in (CLIPPED, UNCERTAIN) else None
-                found.setdefault(f"{word}: {own or DOUBTS[word]}", []).append(row)
-    return found
+                specific = advice.get(row.key) if word in (CLIPPED, UNCERTAIN) else None
+                rows_by_reservation.setdefault(f"{word}: {specific or DOUBTS[word]}", []).append(
+                    row
+                )
+    return rows_by_reservation
 
 
 def strokes_of(parameters: Duty) -> tuple[Stroke, ...]:
@@ -84,8 +86,8 @@ def missing_speeds(parameters: Seal, stroke: Stroke, rows: Sequence[FilmRow]) ->
     They have no row, or one of a coarser mesh that does not meet the tolerance.
     """
     outside = {row.key for row in outside_tolerance(parameters, rows)}
-    kept = {r.key for r in rows if not (r.key in outside and r.density < parameters.density)}
-    return tuple(u for u in parameters.speeds if SIGNS[stroke] * u not in kept)
+    solved = {r.key for r in rows if not (r.key in outside and r.density < parameters.density)}
+    return tuple(u for u in parameters.speeds if SIGNS[stroke] * u not in solved)
 
 
 def outside_tolerance(parameters: Discretisation, rows: Sequence[FilmRow]) -> list[FilmRow]:

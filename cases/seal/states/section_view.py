@@ -25,10 +25,12 @@ def section_view(system: SealSystem, x: Array, rod_pressure: Array) -> Section:
     principal stretches in their middle.
     """
     mesh = system.mesh
-    found = [system.problem.fields(solid, x) for solid in system.solids]
-    fields = {name: np.concatenate([f[name] for f in found]) for name in found[0]}
+    fields_by_solid = [system.problem.fields(solid, x) for solid in system.solids]
+    fields = {
+        name: np.concatenate([f[name] for f in fields_by_solid]) for name in fields_by_solid[0]
+    }
     stresses = {name: fields[f"sigma_{name}"] for name in ("zz", "rr", "tt", "zr")}
-    kept = {name: value for name, value in fields.items() if name not in ("z", "r")}
+    nodal_fields = {name: value for name, value in fields.items() if name not in ("z", "r")}
     on_rod = np.zeros(len(mesh.points))
     on_rod[mesh.arc_nodes] = rod_pressure
     deformed = system.deformed(x)
@@ -39,7 +41,7 @@ def section_view(system: SealSystem, x: Array, rod_pressure: Array) -> Section:
             "displacement": system.displacements(x).copy(),
             "contact_pressure": housing_pressure(system, x),
             "rod_pressure": on_rod,
-            **nodal_average(mesh.quads, kept, len(mesh.points)),
+            **nodal_average(mesh.quads, nodal_fields, len(mesh.points)),
         },
         cell_data={
             "von_mises": von_mises(**stresses).mean(axis=1),
@@ -54,10 +56,10 @@ def principal_stretches(points: Array, deformed: Array, quads: Integers) -> dict
     points, deformed: (nodes, 2), as (z, r). stretch_1 >= stretch_2 are those in the plane of the
     section, stretch_hoop that around the axis.
     """
-    before, after = points[quads], deformed[quads]
-    gradient = np.linalg.solve(_SLOPES @ before, _SLOPES @ after)  # transposed
+    previous, after = points[quads], deformed[quads]
+    gradient = np.linalg.solve(_SLOPES @ previous, _SLOPES @ after)  # transposed
     first, second = np.linalg.svd(gradient, compute_uv=False).T
-    hoop = after[:, :, 1].mean(axis=1) / before[:, :, 1].mean(axis=1)
+    hoop = after[:, :, 1].mean(axis=1) / previous[:, :, 1].mean(axis=1)
     return {"stretch_1": first, "stretch_2": second, "stretch_hoop": hoop}
 
 

@@ -40,11 +40,11 @@ def resolved(row: FilmRow) -> bool:
     return row.verdict == OK and shows_inlet(row.inlet_ratio)
 
 
-def rows_of(row: FilmRow, found: Mapping[str, Mapping[str, float]]) -> list[SensitivityRow]:
+def rows_of(row: FilmRow, sensitivities: Mapping[str, Mapping[str, float]]) -> list[SensitivityRow]:
     """The lines of a state in `sensitivity.csv`."""
-    place = row.sealed_pressure_MPa, row.rod_speed_mm_s
+    operating_point = row.sealed_pressure_MPa, row.rod_speed_mm_s
     return [
-        SensitivityRow(*place, quantity, name, slope)
-        for quantity, slopes in found.items()
-        for name, slope in slopes.items()
+        SensitivityRow(*operating_point, quantity, name, slope)
+        for quantity, log_derivatives in sensitivities.items()
+        for name, slope in log_derivatives.items()
     ]

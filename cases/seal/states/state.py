@@ -72,23 +72,27 @@ class FilmRow(Row):
 
     sealed_pressure_MPa: float = column("MPa", "sealed pressure p_s")
     rod_speed_mm_s: float = column(
-        "mm/s", "rod speed U, + = outstroke (to the air side)", head="U", shown="+g"
+        "mm/s", "rod speed U, + = outstroke (to the air side)", head="U", number_format="+g"
     )
-    h_star_um: float = column("um", "film thickness h* = q / u, u = U / 2", head="h*", shown=".4g")
+    h_star_um: float = column(
+        "um", "film thickness h* = q / u, u = U / 2", head="h*", number_format=".4g"
+    )
     h_star_error_percent: float = column(
         "%",
         "estimated error of h*, + where it is too large; nan where not known",
         head="error",
-        shown="+.2f",
+        number_format="+.2f",
         default=nan,
     )
-    h_min_um: float = column("um", "least film thickness at a node", head="h min", shown=".4g")
-    p_max_MPa: float = column("MPa", "largest film pressure", head="p max", shown=".4f")
+    h_min_um: float = column(
+        "um", "least film thickness at a node", head="h min", number_format=".4g"
+    )
+    p_max_MPa: float = column("MPa", "largest film pressure", head="p max", number_format=".4f")
     pressure_jump_max_MPa: float = column(
         "MPa", "largest jump of the pressure at a facet; 0 for continuous pressure"
     )
     rod_friction_N: float = column(
-        "N", "friction force of the film on the rod", head="friction", shown=".4g"
+        "N", "friction force of the film on the rod", head="friction", number_format=".4g"
     )
     rod_friction_error_percent: float = column(
         "%",
@@ -96,19 +100,19 @@ class FilmRow(Row):
         default=nan,
     )
     leak_rate_mm3_s: float = column(
-        "mm3/s", "leak rate 2 pi R q, + = to the air side", head="leak", shown=".4g"
+        "mm3/s", "leak rate 2 pi R q, + = to the air side", head="leak", number_format=".4g"
     )
     contact_start_mm: float = column(
         "mm",
         "sealed end of the contact, where h is 20 um, or twice the least h if that is more",
         head="contact",
-        shown=".2f",
+        number_format=".2f",
     )
     contact_end_mm: float = column(
         "mm",
         "air end of the contact, where h is 20 um, or twice the least h if that is more",
         head="contact",
-        shown="+.2f",
+        number_format="+.2f",
     )
     newton_iterations: int = column(
         "", "iterations of Newton's method for this state", head="Newton"
@@ -191,9 +195,9 @@ class FilmRow(Row):
     @property
     def line(self) -> str:
         """Place and film thickness."""
-        place = f"p_s = {self.sealed_pressure_MPa:g} MPa, U = {self.rod_speed_mm_s:+g} mm/s"
+        point = f"p_s = {self.sealed_pressure_MPa:g} MPa, U = {self.rod_speed_mm_s:+g} mm/s"
         value = f"h* = {self.h_star_um:.4g} um" if self.usable else f"{self.verdict}: not a result"
-        return f"{place}: {value}"
+        return f"{point}: {value}"
 
     @property
     def stroke(self) -> str:
@@ -260,7 +264,7 @@ class ContactState:
     section: Section
 
 
-def place(sealed_pressure: float, stroke: str) -> dict[str, Any]:
+def operating_point(sealed_pressure: float, stroke: str) -> dict[str, Any]:
     """Marks that tell a stage from others of its name, as in run.json."""
     return {"sealed_pressure_MPa": sealed_pressure, "stroke": stroke}
 

@@ -35,7 +35,7 @@ class _Speed:
         return "leaks" if self.net.net_mm3_per_mm > 0.0 else "returns"
 
 
-def answer(rows: Sequence[FilmRow], travel: float, stroke: str = "both") -> list[str]:
+def run_summary(rows: Sequence[FilmRow], travel: float, stroke: str = "both") -> list[str]:
     """Answer if the seal leaks, and a line for each sealed pressure and speed |U|, fast ones first.
 
     travel: way of the rod from end to end, mm. stroke: what was asked for. A line with a film that
@@ -48,8 +48,8 @@ def answer(rows: Sequence[FilmRow], travel: float, stroke: str = "both") -> list
     for row in sorted(rows, key=lambda row: row.order):
         at = row.sealed_pressure_MPa, abs(row.rod_speed_mm_s)
         strokes.setdefault(at, {})[row.stroke] = row
-    places = sorted(strokes, key=lambda at: (at[0], -at[1]))
-    speeds = [_Speed(*at, strokes[at], nets.get(at)) for at in places]
+    points = sorted(strokes, key=lambda at: (at[0], -at[1]))
+    speeds = [_Speed(*at, strokes[at], nets.get(at)) for at in points]
     first = _whether(speeds, travel)
     if stroke != "both" and not nets:
         first = f'{stroke}stroke alone, as asked for; leakage needs stroke = "both"'
@@ -76,12 +76,12 @@ def _whether(speeds: Sequence[_Speed], travel: float) -> str:
     if not leaking:
         even = set(kinds) == {"even"}
         return f"{'takes back as much as it takes out' if even else RETURNS} {cycle}"
-    rate, most = max(leaking, key=lambda item: item[0])
+    rate, worst = max(leaking, key=lambda item: item[0])
     volume = f"{travel * rate:.3g} mm3 {cycle}"
     if len(kinds) == 1:
         return f"leaks {volume}"
     several = len({speed.sealed_pressure for speed in speeds}) > 1
-    at = f"{most.sealed_pressure:g} MPa and " * several + f"{most.speed:g} mm/s"
+    at = f"{worst.sealed_pressure:g} MPa and " * several + f"{worst.speed:g} mm/s"
     tight = len(kinds) - len(leaking)
     return f"leaks, most at {at}: {volume}" + (f"; not at {tight} of {len(kinds)}" if tight else "")
 
@@ -93,8 +93,10 @@ def _line(speed: _Speed, travel: float, stroke: str) -> str:
     parts = [f"friction {', '.join(forces)}", *_ratio(strokes)]
     if speed.net is not None or stroke == "both":
         parts.insert(0, _leakage(speed, travel))
-    doubts = [f"{stroke} {row.verdict}" for stroke, row in strokes.items() if row.verdict != OK]
-    doubt = f" ({', '.join(doubts)})" if doubts else ""
+    reservations = [
+        f"{stroke} {row.verdict}" for stroke, row in strokes.items() if row.verdict != OK
+    ]
+    doubt = f" ({', '.join(reservations)})" if reservations else ""
     line, thin = f"  {speed.speed:g} mm/s: {'; '.join(parts)}{doubt}", _thin(strokes)
     return Alarm(f"{line}; {thin}") if thin else line
 

@@ -173,8 +173,8 @@ class FilmNumbers:
         """
         others = self.contacts[1:] if self.flux > 0.0 else self.contacts[:-1]
         ratios = [contact.inlet_ratio for contact in others]
-        found = [ratio for ratio in ratios if isfinite(ratio) and not isfinite(self.lambda_ratio)]
-        return max(found, key=lambda ratio: abs(ratio - 1.0), default=1.0)
+        finite = [ratio for ratio in ratios if isfinite(ratio) and not isfinite(self.lambda_ratio)]
+        return max(finite, key=lambda ratio: abs(ratio - 1.0), default=1.0)
 
     @property
     def touching(self) -> bool:
@@ -207,8 +207,8 @@ class FilmNumbers:
 
 def fewest_inlet_segments(reynolds: str, m_p: int, lobes: int = 1) -> float:
     """Segments that the inlet needs with pressures of order m_p, "fe" or "dg"."""
-    least = FEWEST_INLET_SEGMENTS * min(lobes, 2)
-    return max(INLET_SEGMENTS_OF_LOW_ORDERS.get((reynolds, m_p), least), least)
+    minimum = FEWEST_INLET_SEGMENTS * min(lobes, 2)
+    return max(INLET_SEGMENTS_OF_LOW_ORDERS.get((reynolds, m_p), minimum), minimum)
 
 
 def shows_inlet(ratio: float) -> bool:
@@ -226,9 +226,9 @@ class Verdict:
     reference: maximum contact pressure without film, MPa. last: the film. collapsed: what gave it
     away as a spurious collapsed one, if anything did: a pressure well above the contact's, a drag
     that rises while the speed falls, or a thickness that falls too fast. fewest: segments that the
-    inlet needs. slopes: whether the slope of an inlet is judged. error: estimated error of h*, %,
-    None where none is wanted. rough: between rough surfaces friction may rise while the speed
-    falls, and h may be negative. unsealed: where the sealed pressure ends although nothing is
+    inlet needs. judge_slopes: whether the slope of an inlet is judged. error: estimated error of
+    h*, %, None where none is wanted. rough: between rough surfaces friction may rise while the
+    speed falls, and h may be negative. unsealed: where the sealed pressure ends although nothing is
     touched there. references: maximum contact pressures of each contact, from the sealed side on.
     overlap: what the section runs into: itself, or the rod beyond its film. reservation: why it is
     not `ok` although nothing that another mesh may better stands against it.
@@ -238,7 +238,7 @@ class Verdict:
     last: FilmNumbers | None = None
     collapsed: str = ""
     fewest: float = FEWEST_INLET_SEGMENTS
-    slopes: bool = False
+    judge_slopes: bool = False
     error: float | None = None
     rough: bool = False
     unsealed: str = ""
@@ -253,14 +253,14 @@ class Verdict:
     @property
     def word(self) -> str:
         """OK or what is worst: COLLAPSED, UNDER_RESOLVED, CLIPPED, UNCERTAIN, OSCILLATING."""
-        return next((word for word, _ in self._doubts()), OK)
+        return next((word for word, _ in self._reservations()), OK)
 
     @property
     def advice(self) -> str:
         """Advice; empty for OK."""
-        return next((advice for _, advice in self._doubts()), "")
+        return next((advice for _, advice in self._reservations()), "")
 
-    def _doubts(self) -> Iterator[tuple[str, str]]:
+    def _reservations(self) -> Iterator[tuple[str, str]]:
         """Verdicts that stand against the last film, worst first, each with its advice."""
         if self.collapsed:
             yield COLLAPSED, f"the film collapsed on this mesh; {FINER}: {self.collapsed}"
@@ -271,9 +271,9 @@ class Verdict:
             yield UNDER_RESOLVED, _SHORT.format(film.inlet_segments, self.fewest)
         if film.clipped:
             yield CLIPPED, _cut(film)
-        if self.slopes and not shows_inlet(film.inlet_ratio):
+        if self.judge_slopes and not shows_inlet(film.inlet_ratio):
             yield UNDER_RESOLVED, _UNSEEN.format(film.inlet_ratio, "its")
-        if self.slopes and abs(film.next_ratio - 1.0) > NEXT_RATIO:
+        if self.judge_slopes and abs(film.next_ratio - 1.0) > NEXT_RATIO:
             yield UNDER_RESOLVED, _UNSEEN.format(film.next_ratio, "the next contact's")
         if self.unsealed:
             yield UNCERTAIN, _UNSEALED.format(self.unsealed)
@@ -288,23 +288,23 @@ class Verdict:
         if self.reservation:
             yield UNCERTAIN, self.reservation
 
-    def _shown(self, film: FilmNumbers) -> bool:
+    def _resolves_inlets(self, film: FilmNumbers) -> bool:
         """True if the mesh shows the inlets of a film: it has not collapsed on it.
 
         A thick film moves load from one contact to another: at 7 um an X-ring had 11 % more
         pressure under one lobe, with the same h* at density 4.
         """
         inlets = shows_inlet(film.inlet_ratio) and abs(film.next_ratio - 1.0) <= NEXT_RATIO
-        return self.slopes and inlets and not film.short(self.fewest)
+        return self.judge_slopes and inlets and not film.short(self.fewest)
 
     def _suspicion(self, film: FilmNumbers) -> str:
         last, peaks = self.last, [(film.p_max, self.reference)]
         if film.h_min <= 0.0 and not self.rough:
             return f"its least thickness is {1e3 * film.h_min:.2g} um"
         if len(film.contacts) == len(self.references) > 1:
-            own = [contact.p_max for contact in film.contacts]
-            peaks = list(zip(own, self.references, strict=True))
-        for peak, reference in [] if self._shown(film) else peaks:
+            peaks_by_contact = [contact.p_max for contact in film.contacts]
+            peaks = list(zip(peaks_by_contact, self.references, strict=True))
+        for peak, reference in [] if self._resolves_inlets(film) else peaks:
             if peak - reference > EXCESS_PRESSURE * reference:
                 excess = f"{peak - reference:.2f} MPa above that of frictionless contact"
                 return f"the maximum pressure is {excess}"

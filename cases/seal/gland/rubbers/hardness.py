@@ -33,6 +33,6 @@ def shore_band(shore_A: float, polymer: str | None = None) -> tuple[float, float
 
     That is how rubbers are sold; the rules themselves are no better. The scale ends at 100.
     """
-    most = min(shore_A + 5.0, 100.0) if polymer == "PU" else shore_A + 5.0
-    low, middle, high = (youngs_modulus(s, polymer) for s in (shore_A - 5.0, shore_A, most))
+    upper = min(shore_A + 5.0, 100.0) if polymer == "PU" else shore_A + 5.0
+    low, middle, high = (youngs_modulus(s, polymer) for s in (shore_A - 5.0, shore_A, upper))
     return 100.0 * (low / middle - 1.0), 100.0 * (high / middle - 1.0)

@@ -53,8 +53,8 @@ class Material:
 
 def _ogden(mu: Sequence[float], alpha: Sequence[float]) -> dict[str, float]:
     """Terms that are not there have no modulus."""
-    rest = TERMS - len(mu)
-    pairs = zip([*mu, *[0.0] * rest], [*alpha, *[2.0] * rest], strict=True)
+    missing = TERMS - len(mu)
+    pairs = zip([*mu, *[0.0] * missing], [*alpha, *[2.0] * missing], strict=True)
     return {
         name: value
         for k, (m, a) in enumerate(pairs, 1)
@@ -115,8 +115,8 @@ def nominal_stress(material: Material, values: Values, e: Array, stretch: Array)
 
 def stress_by(material: Material, name: str, values: Values, e: Array, stretch: Array) -> Array:
     """Derivative (n,) of the nominal stress by a parameter of the kernel."""
-    places = np.ones((len(e), 2))
-    R = material.sheet.derivative(name, places, e, parameters=dict(values))
+    points = np.ones((len(e), 2))
+    R = material.sheet.derivative(name, points, e, parameters=dict(values))
     return np.asarray(R[:, 0] / stretch)
 
 
@@ -128,15 +128,15 @@ def unstable_at(
     Asked is that the true stresses grow with the logarithmic strains in every direction, in every
     test within RANGE or the wider limits given for it.
     """
-    found = []
+    failures = []
     for test in SECOND:
         low, high = (limits or {}).get(test, RANGE)
         steps = np.linspace(log(min(low, RANGE[0])), log(max(high, RANGE[1])), 241)
         e = strains(test, np.exp(steps))
         _, K = material.sheet.tangent(np.ones((len(e), 2)), e, parameters=dict(values))
-        wrong = steps[np.logical_not(_positive(K))]
-        found += [(abs(s), test, float(np.exp(s))) for s in wrong]
-    return min(found)[1:] if found else None
+        failing = steps[np.logical_not(_positive(K))]
+        failures += [(abs(s), test, float(np.exp(s))) for s in failing]
+    return min(failures)[1:] if failures else None
 
 
 def _positive(K: Array) -> Flags:

@@ -27,19 +27,19 @@ class Region(Rubber):
     """Material of a region of a section.  Raises pydantic.ValidationError, ValueError."""
 
     @classmethod
-    def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def worded(cls, values: dict[str, Any]) -> dict[str, Any]:
         """As in the base; a plastic is one of the presets, or none."""
-        name = given.get("material")
+        name = values.get("material")
         plastic = isinstance(name, str) and is_plastic(name)
-        return given if plastic else super().worded(given)
+        return values if plastic else super().worded(values)
 
     @classmethod
-    def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def completed(cls, values: dict[str, Any]) -> dict[str, Any]:
         """The keys of its material filled in."""
-        name = given.get("material")
+        name = values.get("material")
         preset = PRESETS.get(name, {}) if isinstance(name, str) else {}
         return with_rubber(
-            {**given, **preset, **{k: v for k, v in given.items() if k != "material"}}
+            {**values, **preset, **{k: v for k, v in values.items() if k != "material"}}
         )
 
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from softehl.cases.seal.gland.key_values import number, put, shown
+from softehl.cases.seal.gland.key_values import number, put, value_text
 from softehl.cases.seal.gland.rubbers.hardness import shore_range, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import KEYS, MATERIALS, Material, shear_modulus
 from softehl.cases.seal.gland.rubbers.rubber_fit import fit, read_data
@@ -52,11 +52,11 @@ def _with_hardness(values: dict[str, Any]) -> str | None:
     """The hardness of a rubber that is given by its name, "NBR 70"; returns its polymer."""
     text, polymer = values.get("compound"), None
     if isinstance(text, str):
-        found = read_rubber("compound", text)
-        if found is None:
+        rubber = read_rubber("compound", text)
+        if rubber is None:
             raise refused("compound", text, "is not understood", "NBR 70", "PU 95", "70 Shore A")
-        values["compound"], polymer = found.text, found.polymer
-        put(values, "shore_A", found.shore_A, f'compound = "{found.text}"')
+        values["compound"], polymer = rubber.text, rubber.polymer
+        put(values, "shore_A", rubber.shore_A, f'compound = "{rubber.text}"')
     shore = values.get("shore_A")
     if isinstance(shore, str):
         raise ValueError(f'shore_A = "{shore}" is not understood; write shore_A = 70 or "NBR 70"')
@@ -93,7 +93,7 @@ def _require_own(values: dict[str, Any], material: Material) -> None:
         if values.get(key) is not None:
             own = " and ".join(material.keys)
             raise ValueError(
-                f"{key} = {shown(values[key])} and {source} contradict: it has {own}; "
+                f"{key} = {value_text(values[key])} and {source} contradict: it has {own}; "
                 "leave one of them out"
             )
         values[key] = None
@@ -109,14 +109,14 @@ def _with_shore(values: dict[str, Any], material: Material, polymer: str | None)
 def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:
     name, terms, heat = values["material"], values.get("ogden_terms"), values.get("temperature")
     terms = terms if isinstance(terms, int) and 1 <= terms <= 3 else 3
-    found = fit(name, read_data(path), terms, float(heat) if number(heat) else None)
-    if found.unstable:
-        test, stretch = found.unstable
+    result = fit(name, read_data(path), terms, float(heat) if number(heat) else None)
+    if result.unstable:
+        test, stretch = result.unstable
         raise ValueError(
             f'fit = "{path}": material = "{name}" fitted to these tests is not stable in {test} '
             f"tension at a stretch of {stretch:.3g}; take another material or more tests"
         )
-    for key, value in found.values.items():
+    for key, value in result.values.items():
         # a fit of another version or machine agrees to about 1e-5
         put(values, key, value, f'fit = "{path}"', within=1e-3)
 

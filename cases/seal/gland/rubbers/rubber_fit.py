@@ -54,10 +54,10 @@ class RubberData:
         """The temperatures of the table, rising; empty if it has none."""
         return sorted(set(self.temperature[np.isfinite(self.temperature)].tolist()))
 
-    def part(self, chosen: Array) -> RubberData:
+    def part(self, selection: Array) -> RubberData:
         """Some of the points."""
         points = self.test, self.stretch, self.stress, self.temperature
-        return RubberData(*(of_all[chosen] for of_all in points))
+        return RubberData(*(of_all[selection] for of_all in points))
 
 
 def read_data(path: Path) -> RubberData:
@@ -138,17 +138,17 @@ def fit(name: str, data: RubberData, terms: int = TERMS, temperature: float | No
     """
     material, heats = MATERIALS[name], data.temperatures
     if heats and temperature is None and len(heats) > 1:
-        listed = ", ".join(f"{heat:g}" for heat in heats)
-        raise ValueError(f"the tests are at {listed} degC: give the temperature of the seal")
+        heats_text = ", ".join(f"{heat:g}" for heat in heats)
+        raise ValueError(f"the tests are at {heats_text} degC: give the temperature of the seal")
     counts = [int((data.temperature == heat).sum()) for heat in heats]
     base = data.part(data.temperature == heats[int(np.argmax(counts))]) if heats else data
-    wanted = 2 * terms if name == "ogden" else len(material.keys)
-    if len(base.stretch) < wanted + 1:
+    required = 2 * terms if name == "ogden" else len(material.keys)
+    if len(base.stretch) < required + 1:
         raise ValueError(
-            f"{len(base.stretch)} points are too few for the {wanted} parameters of {name}"
+            f"{len(base.stretch)} points are too few for the {required} parameters of {name}"
         )
-    given = _fitted(name, base, terms)
-    values = material.kernel_values(given)
+    parameters = _fitted(name, base, terms)
+    values = material.kernel_values(parameters)
     model = nominal_stress(material, values, data.strains, data.stretch)
     factors: dict[float, float] = {}  # on all stresses, 1 where the shape was fitted
     for heat in heats:
@@ -157,11 +157,11 @@ def fit(name: str, data: RubberData, terms: int = TERMS, temperature: float | No
         model[at] *= factors[heat]
     if factors:
         factor = _factor(factors, temperature)
-        given |= {k: times(v, factor) for k, v in given.items() if k in MODULI}
+        parameters |= {k: times(v, factor) for k, v in parameters.items() if k in MODULI}
     tested = {test: data.stretch[data.test == test] for test in set(data.test.tolist())}
     limits = {test: (float(at.min()), float(at.max())) for test, at in tested.items()}
-    found = unstable_at(material, material.kernel_values(given), limits)
-    return Fit(name, data, given, model, found)
+    instability = unstable_at(material, material.kernel_values(parameters), limits)
+    return Fit(name, data, parameters, model, instability)
 
 
 def _factor(factors: Mapping[float, float], temperature: float | None) -> float:
@@ -185,31 +185,31 @@ def _fitted(name: str, data: RubberData, terms: int) -> dict[str, Any]:
 
     material, e, stretch = MATERIALS[name], data.strains, data.stretch
     starts, limits = _starts(name, data, terms)
-    ends = limits[:, 0], limits[:, 1]
+    bounds = limits[:, 0], limits[:, 1]
     if name == "ogden":
         names = [f"{letter}_{k + 1}" for letter in ("mu", "alpha") for k in range(terms)]
     else:  # the kernel of neo-hooke has a modulus more, which is 0
         names = list(material.kernel_values(dict.fromkeys(material.keys, 1.0)))[: len(limits)]
 
-    def given(x: Array) -> dict[str, Any]:
+    def keys_of(x: Array) -> dict[str, Any]:
         numbers = tuple(map(float, x))
         if name == "ogden":
             return {"ogden_mu": numbers[:terms], "ogden_alpha": numbers[terms:]}
         return dict(zip(material.keys, numbers, strict=True))
 
     def residual(x: Array) -> Array:
-        values = material.kernel_values(given(x))
+        values = material.kernel_values(keys_of(x))
         return nominal_stress(material, values, e, stretch) - data.stress
 
-    def slopes(x: Array) -> Array:
-        values = material.kernel_values(given(x))
+    def jacobian(x: Array) -> Array:
+        values = material.kernel_values(keys_of(x))
         return np.stack([stress_by(material, n, values, e, stretch) for n in names], axis=1)
 
-    found = (
-        least_squares(residual, start, slopes, ends, x_scale="jac", max_nfev=2000)
+    fits = (
+        least_squares(residual, start, jacobian, bounds, x_scale="jac", max_nfev=2000)
         for start in starts
     )
-    return given(min(found, key=lambda one: one.cost).x)
+    return keys_of(min(fits, key=lambda one: one.cost).x)
 
 
 def _starts(name: str, data: RubberData, terms: int) -> tuple[Array, Array]:
@@ -220,14 +220,14 @@ def _starts(name: str, data: RubberData, terms: int) -> tuple[Array, Array]:
     """
     if name == "ogden":
         alpha = np.array([(1.3, 5.0, -2.0), (2.0, 8.0, -1.0), (0.6, 3.0, -4.0)])[:, :terms]
-        ends = [np.outer(np.sign(alpha[0]), sizes) for sizes in ((0.0, np.inf), (0.05, 20.0))]
+        bounds = [np.outer(np.sign(alpha[0]), sizes) for sizes in ((0.0, np.inf), (0.05, 20.0))]
         mu = 0.25 ** np.arange(terms) / alpha
-        return np.hstack([mu, alpha]), np.sort(np.vstack(ends), axis=1)
+        return np.hstack([mu, alpha]), np.sort(np.vstack(bounds), axis=1)
     if name in ("gent", "arruda-boyce"):  # J_m above all I1 - 3 of the data, lambda_m above 1
         squares = np.exp(2.0 * data.strains)
         first = float((squares.sum(axis=1) + 1.0 / squares.prod(axis=1)).max()) - 3.0
-        least = 1.001 * (first if name == "gent" else 1.0)
-        starts = [(1.0, part * least) for part in (1.1, 2.0, 10.0)]
-        return np.array(starts), np.array([(0.0, np.inf), (least, np.inf)])
+        lower = 1.001 * (first if name == "gent" else 1.0)
+        starts = [(1.0, part * lower) for part in (1.1, 2.0, 10.0)]
+        return np.array(starts), np.array([(0.0, np.inf), (lower, np.inf)])
     count = len(MATERIALS[name].keys)
     return np.ones((1, count)), np.array([(-np.inf if name == "yeoh" else 0.0, np.inf)] * count)

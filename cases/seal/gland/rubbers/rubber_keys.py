@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from softehl.cases.harness.parameters import Number, Parameters, key
-from softehl.cases.seal.gland.key_values import shown
+from softehl.cases.seal.gland.key_values import value_text
 from softehl.cases.seal.gland.rubbers import materials
 from softehl.cases.seal.gland.rubbers.rubber import PAPER
 from softehl.cases.seal.gland.trade.parse_terms import rubber_named
@@ -66,15 +66,15 @@ class Rubber(Parameters):
     bulk_modulus: float = key(500.0, "bulk modulus kappa", unit="MPa", gt=0, le=1e5)
 
     @classmethod
-    def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def worded(cls, values: dict[str, Any]) -> dict[str, Any]:
         """As in the base, and rubbers by their names."""
-        return super().worded(rubber_named(given))
+        return super().worded(rubber_named(values))
 
     @property
     def polymer(self) -> str | None:
         """Of the rubber that is named."""
-        found = read_rubber("compound", self.compound) if self.compound else None
-        return found.polymer if found else None
+        rubber = read_rubber("compound", self.compound) if self.compound else None
+        return rubber.polymer if rubber else None
 
     @property
     def energy(self) -> str:
@@ -89,8 +89,8 @@ class Rubber(Parameters):
     @property
     def rubber_values(self) -> dict[str, float]:
         """Parameters of the solid's kernel."""
-        own = materials.MATERIALS[self.material].kernel_values(self._rubber)
-        return {**own, "kappa": self.bulk_modulus}
+        values = materials.MATERIALS[self.material].kernel_values(self._rubber)
+        return {**values, "kappa": self.bulk_modulus}
 
     def solid_kernel(self, element: str) -> str:
         """Name of the kernel of a solid element: with the energy where it is not the paper's."""
@@ -102,11 +102,11 @@ class Rubber(Parameters):
 
     @model_validator(mode="after")
     def _is_stable(self) -> Self:
-        material, given = materials.MATERIALS[self.material], self._rubber
+        material, values = materials.MATERIALS[self.material], self._rubber
         if self.energy == "mooney_rivlin":
             return self  # with moduli that are not negative it always is
         if self.material == "ogden":
-            mu, alpha = given["ogden_mu"], given["ogden_alpha"]
+            mu, alpha = values["ogden_mu"], values["ogden_alpha"]
             if len(mu) != len(alpha):
                 raise ValueError(
                     f"ogden_mu has {len(mu)} and ogden_alpha {len(alpha)} values: a term is a pair "
@@ -114,11 +114,11 @@ class Rubber(Parameters):
                 )
             if 0.0 in alpha:
                 raise ValueError("ogden_alpha has a 0: an exponent of 0 is no term; leave it out")
-        if found := materials.unstable_at(material, material.kernel_values(given)):
-            keys = ", ".join(f"{key} = {shown(given[key])}" for key in material.keys)
+        if unstable := materials.unstable_at(material, material.kernel_values(values)):
+            keys = ", ".join(f"{key} = {value_text(values[key])}" for key in material.keys)
             raise ValueError(
-                f'material = "{self.material}" ({keys}) is not stable in {found[0]} tension at a '
-                f"stretch of {found[1]:.3g} (its stress falls there, or it locks); a seal needs "
-                "0.6 to 1.6"
+                f'material = "{self.material}" ({keys}) is not stable in {unstable[0]} tension at '
+                f"a stretch of {unstable[1]:.3g} (its stress falls there, or it locks); a seal "
+                "needs 0.6 to 1.6"
             )
         return self

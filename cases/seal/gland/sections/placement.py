@@ -46,18 +46,18 @@ def runs(names: Sequence[str]) -> Runs:
 
 def _run(flags: Sequence[bool], name: str) -> tuple[int, int]:
     """First of the pieces that have a name, and how many they are; they follow one another."""
-    here = np.array(flags, dtype=np.bool_)
-    if not here.any():
+    marked = np.array(flags, dtype=np.bool_)
+    if not marked.any():
         does = "may carry film" if name == FILM else "sealed pressure acts on"
         raise OutlineError(
             f"nothing is named {name}; put the part of the contour that {does} on a layer, or in "
             "a group, of that name"
         )
-    starts = np.flatnonzero(here & ~np.roll(here, 1))
+    starts = np.flatnonzero(marked & ~np.roll(marked, 1))
     if len(starts) != 1:
-        words = "is the whole contour" if here.all() else f"is {len(starts)} parts"
-        raise OutlineError(f"{name} {words}; it must be one part, and not all of it")
-    return int(starts[0]), int(here.sum())
+        text = "is the whole contour" if marked.all() else f"is {len(starts)} parts"
+        raise OutlineError(f"{name} {text}; it must be one part, and not all of it")
+    return int(starts[0]), int(marked.sum())
 
 
 def named_shape(named: Sequence[Named], inner_diameter: float | None, name: str) -> Shape:
@@ -68,16 +68,16 @@ def named_shape(named: Sequence[Named], inner_diameter: float | None, name: str)
     outline = Outline([piece for piece, _ in named])
     if outline.pieces[0] != named[0][0]:  # it was clockwise
         named = _backwards(named)
-    found = runs([side for _, side in named])
-    if found.mirrored:
+    sides = runs([side for _, side in named])
+    if sides.mirrored:
         named = _backwards([(mirrored(piece), side) for piece, side in named])
         outline = Outline([piece for piece, _ in named])
-        found = runs([side for _, side in named])
+        sides = runs([side for _, side in named])
     outline = seated(outline, inner_diameter)
-    places = np.append(outline.starts, outline.length + outline.starts[1:])
+    positions = np.append(outline.starts, outline.length + outline.starts[1:])
     film, pressure = (
-        (float(places[first]), float(places[first + count]))
-        for first, count in (found.film, found.pressure)
+        (float(positions[first]), float(positions[first + count]))
+        for first, count in (sides.film, sides.pressure)
     )
     return film_below(Shape(outline, film, pressure, name))
 

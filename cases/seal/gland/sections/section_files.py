@@ -60,13 +60,13 @@ def _pieces(path: Path) -> list[Named]:
     unit = int(document.header.get("$INSUNITS", 0))
     if unit not in _UNITS:
         raise OutlineError(f"$INSUNITS = {unit} is no metric unit or inch; use mm")
-    found: list[Named] = []
+    pieces_read: list[Named] = []
     for entity in document.modelspace():
         layer = str(entity.dxf.layer)
-        found += [(p.moved(_UNITS[unit], (0.0, 0.0)), layer) for p in _converted(entity)]
-    if not found:
+        pieces_read += [(p.moved(_UNITS[unit], (0.0, 0.0)), layer) for p in _converted(entity)]
+    if not pieces_read:
         raise OutlineError("there is no contour of lines and arcs")
-    return found
+    return pieces_read
 
 
 def _converted(entity: Any) -> Iterator[Piece]:
@@ -83,10 +83,12 @@ def _converted(entity: Any) -> Iterator[Piece]:
             yield from _converted(part)
     elif kind in ("ARC", "CIRCLE"):
         d = entity.dxf
-        ends = [(d.start_angle, d.end_angle)] if kind == "ARC" else [(0.0, 180.0), (180.0, 360.0)]
-        arcs = [_arc(entity, *angles) for angles in ends]
-        behind = d.hasattr("extrusion") and d.extrusion.z < 0.0
-        yield from (map(mirrored, arcs) if behind else arcs)
+        angle_pairs = (
+            [(d.start_angle, d.end_angle)] if kind == "ARC" else [(0.0, 180.0), (180.0, 360.0)]
+        )
+        arcs = [_arc(entity, *angles) for angles in angle_pairs]
+        mirrored_view = d.hasattr("extrusion") and d.extrusion.z < 0.0
+        yield from (map(mirrored, arcs) if mirrored_view else arcs)
     else:
         raise OutlineError(
             f"{kind} on layer {entity.dxf.layer!r} is no line, arc, circle or flat polyline; "
@@ -205,22 +207,22 @@ def _section_of(mesh: Mesh, inner_diameter: float | None, name: str) -> tuple[Sh
     points, quads = mesh.points, _counterclockwise(mesh.points, mesh.cells["quad4"])
     loop = _loop(points, quads)
     names = _names(mesh, loop)
-    found = runs(names)
-    if found.mirrored:
+    sides = runs(names)
+    if sides.mirrored:
         points, quads = points * [-1.0, 1.0], quads[:, ::-1]
         loop, names = loop[::-1], [*names[-2::-1], names[-1]]
-        found = runs(names)
-    first, arc = found.film
+        sides = runs(names)
+    first, arc = sides.film
     loop = np.roll(loop, -first)
     drawn = Outline.polygon(points[loop])
     outline = seated(drawn, inner_diameter)
     points = points + np.subtract(outline.pieces[0].start, drawn.pieces[0].start)
-    places = outline.starts
-    begin, count = (found.pressure[0] - first) % len(loop), found.pressure[1]
-    pressure = float(places[begin]), float(places[(begin + count) % len(loop)])
-    shape = Shape(outline, (0.0, float(places[arc])), pressure, name)
+    positions = outline.starts
+    begin, count = (sides.pressure[0] - first) % len(loop), sides.pressure[1]
+    pressure = float(positions[begin]), float(positions[(begin + count) % len(loop)])
+    shape = Shape(outline, (0.0, float(positions[arc])), pressure, name)
     regions = {group: cells["quad4"] for group, cells in mesh.groups.items() if "quad4" in cells}
-    section = SectionMesh(points, quads, loop, arc, places[:-1], outline.length, regions)
+    section = SectionMesh(points, quads, loop, arc, positions[:-1], outline.length, regions)
     _require_sound(section)
     return film_below(shape), section
 
@@ -240,35 +242,35 @@ def _loop(points: Array, quads: Integers) -> Integers:
         z, r = points[starts[times.argmax()]]
         raise OutlineError(f"the boundary meets itself at ({z:.6g}, {r:.6g}); part it")
     begin, end = in_chains(edges).T
-    ends = np.flatnonzero(end == begin[0])[0] + 1
-    if ends < len(edges):
+    loop_length = np.flatnonzero(end == begin[0])[0] + 1
+    if loop_length < len(edges):
         raise OutlineError(
-            f"the boundary is more than one loop: {ends} of {len(edges)} nodes are on one; a "
-            "section has no holes and is one part"
+            f"the boundary is more than one loop: {loop_length} of {len(edges)} nodes are on one; "
+            "a section has no holes and is one part"
         )
     return np.asarray(begin)
 
 
 def _names(mesh: Mesh, loop: Integers) -> list[str]:
     """FILM, PRESSURE or nothing, of the segment behind each node of the loop."""
-    known = {
+    side_names = {
         frozenset(segment): name.upper()
         for name, faces in mesh.sides.items()
         if name.upper() in (FILM, PRESSURE) and "line2" in faces
         for segment in faces["line2"].tolist()
     }
     pairs = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
-    return [known.get(frozenset(pair), "") for pair in pairs]
+    return [side_names.get(frozenset(pair), "") for pair in pairs]
 
 
 def _require_sound(mesh: SectionMesh) -> None:
-    shares = corner_jacobians(mesh).min(axis=1)
-    worst = int(shares.argmin())
-    if shares[worst] < 0.02:
+    quality = corner_jacobians(mesh).min(axis=1)
+    worst = int(quality.argmin())
+    if quality[worst] < 0.02:
         z, r = mesh.points[mesh.quads[worst]].mean(axis=0)
         raise OutlineError(
             f"an element at ({z:.6g}, {r:.6g}) is folded or nearly so, a corner of it has "
-            f"{shares[worst]:.3g} of its share; mend the mesh there"
+            f"{quality[worst]:.3g} of its share; mend the mesh there"
         )
 
 
@@ -278,10 +280,12 @@ def finer(mesh: SectionMesh, k: int) -> SectionMesh:
     t = (np.arange(k) / k)[None, :, None]
     curve = ((1 - t) * x[:, None] + t * np.roll(x, -1, axis=0)[:, None]).reshape(-1, 2)
     points, quads, border = subdivided(mesh.points, mesh.quads, mesh.boundary, curve, k)
-    ends = np.append(mesh.places, mesh.places[0] + mesh.length)
-    places = (ends[:-1, None] + np.diff(ends)[:, None] * t[0, :, 0]).ravel()
+    ends_of_segments = np.append(mesh.positions, mesh.positions[0] + mesh.length)
+    positions = (
+        ends_of_segments[:-1, None] + np.diff(ends_of_segments)[:, None] * t[0, :, 0]
+    ).ravel()
     regions = {
         name: (cells[:, None] * k**2 + np.arange(k**2)).ravel()
         for name, cells in mesh.regions.items()
     }
-    return SectionMesh(points, quads, border, mesh.arc * k, places, mesh.length, regions)
+    return SectionMesh(points, quads, border, mesh.arc * k, positions, mesh.length, regions)

@@ -50,16 +50,16 @@ def _dimensions() -> dict[str, Any]:
     """Every dimension of every section as a key, once, with what it means in each."""
     uses: dict[str, dict[str, dict[str, Any]]] = {}
     for section, page in SECTIONS.items():
-        for name, own in dimensions(section).items():
-            uses.setdefault(name, {})[section] = declared(page.model_fields[own])
+        for name, field_name in dimensions(section).items():
+            uses.setdefault(name, {})[section] = declared(page.model_fields[field_name])
     return {name: (float | None, _key(of)) for name, of in uses.items()}
 
 
 def _key(uses: Mapping[str, Mapping[str, Any]]) -> Any:
     """A key of the sections that have this dimension."""
     first, *_ = uses.values()
-    shares = " or ".join(dict.fromkeys(f"{extra['part']:g}" for extra in uses.values()))
-    bounds = f"left out = {shares} of section_diameter"
+    parts = " or ".join(dict.fromkeys(f"{extra['part']:g}" for extra in uses.values()))
+    bounds = f"left out = {parts} of section_diameter"
     return key(
         None, f"{', '.join(uses)}: {first['meaning']}", unit="mm", bounds=bounds, ge=0, le=500
     )
@@ -139,22 +139,22 @@ def shape_of(section: str, sizes: tuple[tuple[str, float], ...], inner_diameter:
 @lru_cache(maxsize=32)
 def capped(shape: Shape, thickness: float) -> Shape:
     """The shape with a cut at this height above its lowest point.  ValueError where none can be."""
-    outline, given = shape.outline, f"cap_thickness = {thickness:g} mm"
+    outline, text = shape.outline, f"cap_thickness = {thickness:g} mm"
     _, low, _, high = outline.box
     if thickness >= high - low:
-        raise ValueError(f"{given}: it must be less than the height, {high - low:g} mm")
+        raise ValueError(f"{text}: it must be less than the height, {high - low:g} mm")
     at = outline.level(low + thickness)
     if len(at) != 2:
         raise ValueError(
-            f"{given}: the section is in {len(at) // 2} parts there; a cap is cut off straight"
+            f"{text}: the section is in {len(at) // 2} parts there; a cap is cut off straight"
         )
     begin, end = float(at[0]), float(at[1])
     inside = (np.array(shape.film) - begin) % outline.length
     if not inside[0] < inside[1] < (end - begin) % outline.length:
-        least = float(outline.at(np.array(shape.film))[:, 1].max()) - low
-        raise ValueError(f"{given}: it must hold the film, which needs more than {least:.4g} mm")
+        minimum = float(outline.at(np.array(shape.film))[:, 1].max()) - low
+        raise ValueError(f"{text}: it must hold the film, which needs more than {minimum:.4g} mm")
     if np.abs(np.sin(outline.heading(at))).min() < 0.5:  # 30 degrees between sides and edge
-        raise ValueError(f"{given}: the sides are too flat there; make it thicker or thinner")
+        raise ValueError(f"{text}: the sides are too flat there; make it thicker or thinner")
     return replace(shape, chord=(begin, end))
 
 
@@ -165,12 +165,12 @@ def lobes(shape: Shape) -> int:
     The film is looked at every 3 um or so; a groove has a hundredth of its height.
     """
     r = shape.outline.at(np.linspace(*shape.film, 2000))[:, 1]
-    found, deep, bottom, top = 1, 0.01 * float(np.ptp(r)), r[0], r[0]
+    count, deep, bottom, top = 1, 0.01 * float(np.ptp(r)), r[0], r[0]
     for value in r:
         if min(top - bottom, top - value) > deep:  # behind a groove
-            found, bottom, top = found + 1, value, value
+            count, bottom, top = count + 1, value, value
         elif value < bottom:
             bottom, top = value, value
         else:
             top = max(top, value)
-    return found
+    return count

@@ -39,10 +39,10 @@ class Section(Parameters):
     height: float = key(HEIGHT, "radial height of the section (section_diameter)", unit="mm", gt=0)
 
     @classmethod
-    def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def completed(cls, values: dict[str, Any]) -> dict[str, Any]:
         """The dimensions with those left out as parts of the height."""
-        height = given.get("height", HEIGHT)
-        return {name: part * height for name, part in parts_of(cls).items()} | given
+        height = values.get("height", HEIGHT)
+        return {name: part * height for name, part in parts_of(cls).items()} | values
 
     def shape(self, inner_diameter: float) -> Shape:
         """The section around z = 0, its lowest point at r = inner_diameter / 2.
@@ -54,11 +54,12 @@ class Section(Parameters):
         moved = drawn.moved(shift=(aside, lift))
         return Shape.facing(moved, (z + aside, r + lift), type(self).name)
 
-    def at_most(self, name: str, limit: float, words: str) -> None:
+    def at_most(self, name: str, limit: float, limit_text: str) -> None:
         """Raises OutlineError for a dimension beyond a limit that others set, but for rounding."""
         size = getattr(self, name)
         require(
-            size <= (1.0 + 1e-9) * limit, f"{name} = {size:g} mm; at most {words}, {limit:.4g} mm"
+            size <= (1.0 + 1e-9) * limit,
+            f"{name} = {size:g} mm; at most {limit_text}, {limit:.4g} mm",
         )
 
     def drawn(self) -> Outline:
@@ -90,10 +91,10 @@ def parts_of(kind: type[Section]) -> dict[str, float]:
     return {name: extra["part"] for name, extra in extras.items() if "part" in extra}
 
 
-def require(holds: bool, words: str) -> None:
+def require(holds: bool, message: str) -> None:
     """Raises OutlineError, in words, where dimensions do not go together."""
     if not holds:
-        raise OutlineError(words)
+        raise OutlineError(message)
 
 
 def joined(*pieces: Piece) -> Outline:
@@ -150,14 +151,14 @@ class XRing(Section):
             f"fillet_radius = {self.fillet_radius:g} mm does not reach from lobe to lobe; more "
             f"than {max(z, r) - self.lobe_radius:.4g} mm is needed",
         )
-        under, beside = sqrt(reach**2 - z**2), sqrt(reach**2 - r**2)
-        waist = 2.0 * (min(z + beside, r + under) - self.fillet_radius)
+        under, across = sqrt(reach**2 - z**2), sqrt(reach**2 - r**2)
+        waist = 2.0 * (min(z + across, r + under) - self.fillet_radius)
         require(
             waist > 0.1 * self.height,
             f"lobe_radius = {self.lobe_radius:g} and fillet_radius = {self.fillet_radius:g} mm "
             "leave no rubber between the grooves; make one of them larger",
         )
-        grooves = [(0.0, -r - under), (z + beside, 0.0), (0.0, r + under), (-z - beside, 0.0)]
+        grooves = [(0.0, -r - under), (z + across, 0.0), (0.0, r + under), (-z - across, 0.0)]
         return joined(*self._arcs([(z, -r), (z, r), (-z, r), (-z, -r)], grooves))
 
     def crown(self, drawn: Outline) -> Point:
@@ -174,8 +175,8 @@ class XRing(Section):
 
         arcs = []
         for k, lobe in enumerate(lobes):
-            before, after = grooves[k], grooves[(k + 1) % 4]
-            start, end = touch(lobe, before), touch(lobe, after)
+            previous, after = grooves[k], grooves[(k + 1) % 4]
+            start, end = touch(lobe, previous), touch(lobe, after)
             arcs += [Arc(start, end, lobe)]
             arcs += [Arc(end, touch(lobes[(k + 1) % 4], after), after, ccw=False)]
         return arcs
@@ -264,16 +265,16 @@ class UCup(Section):
         h, heel, w = 0.5 * self.height, 0.5 * self.heel_height, self.width
         opening, root, depth = 0.5 * self.mouth_opening, 0.5 * self.mouth_root, self.mouth_depth
         lip, back = self._tip - opening, w - depth
-        least = 2.0 * self.edge_radius
+        minimum = 2.0 * self.edge_radius
         self.at_most("heel_height", self.height, "the height over the lips")
         self.at_most("mouth_root", self.mouth_opening, "the mouth_opening")
         require(
-            lip > least,
+            lip > minimum,
             f"the tips of the lips are {lip:.4g} mm thick; (height - mouth_opening) / 2 - bevel "
-            f"must be more than twice the edge_radius, {least:g} mm",
+            f"must be more than twice the edge_radius, {minimum:g} mm",
         )
         require(
-            back > 0.1 * w and heel - root > least,
+            back > 0.1 * w and heel - root > minimum,
             f"mouth_depth = {depth:g} and mouth_root = {2 * root:g} mm leave no heel of a width "
             f"of {w:g} and a heel_height of {2 * heel:g} mm",
         )

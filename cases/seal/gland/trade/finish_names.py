@@ -17,29 +17,29 @@ _FINISH = form(rf"{_KIND}(?: max\.?)?[ =<\u2264:]*{_HEIGHT}")
 _TURNED = form(rf"{_HEIGHT} ?{_KIND}")
 
 
-def read_finish(given: str) -> float | None:
+def read_finish(finish: str) -> float | None:
     """Rms height in um of a finish, None where the text is a number with a unit.
 
     Raises NotUnderstoodError.
     """
-    text = plain(given)
+    text = plain(finish)
     if re.fullmatch(rf"{NUMBER} ?({_UNIT})?", text):
         return None
-    found = _FINISH.fullmatch(text) or _TURNED.fullmatch(text)
-    if not found:
+    match = _FINISH.fullmatch(text) or _TURNED.fullmatch(text)
+    if not match:
         if re.search(r"\d ?/ ?R", text):
             why = "has two finishes; write those of rod and seal"
-            raise refused("roughness", given, why, "Ra 0.1 and Ra 0.4")
+            raise refused("roughness", finish, why, "Ra 0.1 and Ra 0.4")
         if re.fullmatch(r"N ?(1[0-2]|[1-9])", text, re.IGNORECASE):
-            raise refused("roughness", given, "is a grade of ISO 1302, a band of Ra", "Ra 0.2")
-        raise refused("roughness", given, "is no finish in um", "Ra 0.2", "Rq 0.25", "0.25 um")
-    kind, unit = found["kind"].lower(), (found["unit"] or "um").lower()
-    height = read_quantity(f"{found['height']} {unit}", "um")
-    if kind == "rms" and height >= 1.0 and not found["unit"]:  # less would be um
+            raise refused("roughness", finish, "is a grade of ISO 1302, a band of Ra", "Ra 0.2")
+        raise refused("roughness", finish, "is no finish in um", "Ra 0.2", "Rq 0.25", "0.25 um")
+    kind, unit = match["kind"].lower(), (match["unit"] or "um").lower()
+    height = read_quantity(f"{match['height']} {unit}", "um")
+    if kind == "rms" and height >= 1.0 and not match["unit"]:  # less would be um
         why = "is in micrometres or in microinches; write the unit"
-        raise refused("roughness", given, why, f"Rq {height:g} um", f"Rq {height:g} uin")
+        raise refused("roughness", finish, why, f"Rq {height:g} um", f"Rq {height:g} uin")
     if kind == "ra":
         return round(RMS_OF_RA * height, 6)
     if kind in ("rq", "rms"):
         return height
-    raise refused("roughness", given, "gives neither Ra nor Rq", "Ra 0.2", "Rq 0.25")
+    raise refused("roughness", finish, "gives neither Ra nor Rq", "Ra 0.2", "Rq 0.25")

@@ -62,35 +62,35 @@ class Band:
         return 0.5 * (self.high - self.low)
 
 
-def read_fit(key: str, given: str, *, hole: bool | None = False) -> Band | None:
+def read_fit(key: str, size_text: str, *, hole: bool | None = False) -> Band | None:
     """The limits of a size; None for a text without a tolerance.  Raises NotUnderstoodError.
 
     hole: whether the size is that of a hole, whose classes have capital letters; None for a size
     that is neither a hole nor a shaft and takes both.
     """
     text = re.sub(
-        r" ?[(](?:ISO 286[^)]*|(?P<limits>[^)]*))[)]$", r" \g<limits>", plain(given)
+        r" ?[(](?:ISO 286[^)]*|(?P<limits>[^)]*))[)]$", r" \g<limits>", plain(size_text)
     ).strip()
-    if found := _ENDS.fullmatch(text):
-        low, high = sorted(map(float, found.groups()))
+    if match := _ENDS.fullmatch(text):
+        low, high = sorted(map(float, match.groups()))
         if 0.9 * high < low:
             return Band(round(0.5 * (low + high), 6), low, high)
-    if found := _CLASS.fullmatch(text):
-        return _class(key, given, found, hole)
-    if found := _BOTH.fullmatch(text):
-        shown = number_text(float(found["size"]))
+    if match := _CLASS.fullmatch(text):
+        return _class(key, size_text, match, hole)
+    if match := _BOTH.fullmatch(text):
+        shown_size = number_text(float(match["size"]))
         why = "is a pair of classes; a diameter has one"
-        raise refused(key, given, why, f"{shown} {'H8' if hole else 'f7'}")
-    if found := _EQUAL.fullmatch(text):
-        ends = [-float(found["by"]), float(found["by"])]
-    elif found := _LIMITS.fullmatch(text):
-        ends = sorted(float((found[k] or "0").replace(" ", "")) for k in ("one", "two"))
+        raise refused(key, size_text, why, f"{shown_size} {'H8' if hole else 'f7'}")
+    if match := _EQUAL.fullmatch(text):
+        deviations = [-float(match["by"]), float(match["by"])]
+    elif match := _LIMITS.fullmatch(text):
+        deviations = sorted(float((match[k] or "0").replace(" ", "")) for k in ("one", "two"))
     else:
         return None
-    size = float(found["size"])
-    low, high = size + ends[0], size + ends[1]
+    size = float(match["size"])
+    low, high = size + deviations[0], size + deviations[1]
     if not 0.0 < low <= high or high - low > 0.1 * size:
-        raise refused(key, given, "has limits that are no tolerance of it", f"{size:g} ±0.05")
+        raise refused(key, size_text, "has limits that are no tolerance of it", f"{size:g} ±0.05")
     return Band(size, low, high)
 
 
@@ -106,20 +106,20 @@ def band(nominal: float, letter: str, grade: int) -> Band:
     return Band(nominal, nominal + away, nominal + away + width)
 
 
-def _class(key: str, given: str, found: re.Match[str], hole: bool | None) -> Band:
-    size, letter, grade = float(found["size"]), found["letter"], int(found["grade"])
-    shown, usual = number_text(size), "H8" if hole else "f7"
+def _class(key: str, size_text: str, match: re.Match[str], hole: bool | None) -> Band:
+    size, letter, grade = float(match["size"]), match["letter"], int(match["grade"])
+    shown_size, usual = number_text(size), "H8" if hole else "f7"
     letters = (*DEVIATIONS, "js")
     if letter.lower() not in letters or grade not in GRADES:
         why = f"is beyond the tables here: {', '.join(letters)} and grades 5 to 12"
-        raise refused(key, given, why, f"{shown} {usual}", f"{shown} ±0.05")
+        raise refused(key, size_text, why, f"{shown_size} {usual}", f"{shown_size} ±0.05")
     part, case, other = ("hole", "capital", letter.upper())
     if not hole:
         part, case, other = ("shaft", "small", letter.lower())
     if hole is not None and letter != other:
         why = f"has the letter of a {'shaft' if hole else 'hole'}: a {part} has {case} letters"
-        raise refused(key, given, why, f"{shown} {other}{grade}")
+        raise refused(key, size_text, why, f"{shown_size} {other}{grade}")
     if not 0.0 < size <= STEPS[-1]:
         why = "is beyond the tables: ISO 286 classes are read up to 500 mm"
-        raise refused(key, given, why, f"{shown} ±0.05")
+        raise refused(key, size_text, why, f"{shown_size} ±0.05")
     return band(size, letter, grade)

@@ -67,66 +67,66 @@ _OTHER = form(
 )
 
 
-def read_oil_name(given: str) -> OilName:
+def read_oil_name(name: str) -> OilName:
     """The oil of a name.  Raises NotUnderstoodError."""
-    text = _STANDARD.sub("", plain(given))
-    found = _GRADE.fullmatch(text)
-    if found and any(found[k] for k in ("plain", "improved", "mineral", "iso")):
-        return _of_grade(found)
+    text = _STANDARD.sub("", plain(name))
+    match = _GRADE.fullmatch(text)
+    if match and any(match[k] for k in ("plain", "improved", "mineral", "iso")):
+        return _of_grade(match)
     points = [_POINT.fullmatch(part.strip()) for part in re.split(r"[;,]| and ", text)]
     if len(points) == 2 and all(points):
         pairs = tuple((float(p["nu"]), _celsius(p)) for p in points if p)
         for nu, at in pairs:
             if not (0.7 < nu < 1e6 and -60.0 <= at <= 300.0):
-                raise refused("oil", given, f": {nu:g} cSt at {at:g} degC is out of range", TWO)
+                raise refused("oil", name, f": {nu:g} cSt at {at:g} degC is out of range", TWO)
         return OilName(points=pairs)
-    raise _unknown(given, text)
+    raise _unknown(name, text)
 
 
-def dynamic(given: str) -> float | None:
+def dynamic(text: str) -> float | None:
     """The dynamic viscosity (MPa s) that a text is, None where it is none."""
     with suppress(ValueError):
-        return read_quantity(plain(given), "MPa s")
+        return read_quantity(plain(text), "MPa s")
     return None
 
 
-def _celsius(found: re.Match[str]) -> float:
+def _celsius(match: re.Match[str]) -> float:
     """The temperature of a name, degC."""
-    at = float(found["at"])
-    return round((at - 32.0) / 1.8, 6) if found["f"] else at
+    at = float(match["at"])
+    return round((at - 32.0) / 1.8, 6) if match["f"] else at
 
 
-def _of_grade(found: re.Match[str]) -> OilName:
-    improved = bool(found["improved"] and not found["index"])
-    index = float(found["index"]) if found["index"] else IMPROVED if improved else None
-    at = _celsius(found) if found["at"] else None
-    return OilName(int(found["grade"]), index, temperature=at, improved=improved)
+def _of_grade(match: re.Match[str]) -> OilName:
+    improved = bool(match["improved"] and not match["index"])
+    index = float(match["index"]) if match["index"] else IMPROVED if improved else None
+    at = _celsius(match) if match["at"] else None
+    return OilName(int(match["grade"]), index, temperature=at, improved=improved)
 
 
-def _unknown(given: str, text: str) -> Exception:
+def _unknown(name: str, text: str) -> Exception:
     """The refusal of a text that is no oil."""
     if _GREASE.fullmatch(text):
         why = (
             "is a grease: its film is one of its base oil, thinner where that does not flow back; "
             "write the base oil, by the viscosities of its data sheet"
         )
-        return refused("oil", given, why, TWO)
+        return refused("oil", name, why, TWO)
     numbers = [int(n) for n in re.findall(r"(?<![\d.])\d+(?![\d.])", text)]
     grade = next((n for n in numbers if n in GRADES), 46)
     forms = (f"ISO VG {grade}", f"HLP {grade}", f"HVLP {grade}", TWO)
-    if found := _OTHER.fullmatch(text):
-        kind = found["kind"] or found["word"]
+    if match := _OTHER.fullmatch(text):
+        kind = match["kind"] or match["word"]
         if kind.upper() == "HV":
-            return refused("oil", given, "does not say its viscosity index", *forms[2:])
+            return refused("oil", name, "does not say its viscosity index", *forms[2:])
         why = (
             "does not say its viscosity: take two values from its data sheet, with oil_density and "
             "pressure_viscosity"
         )
-        return refused("oil", given, why, TWO)
+        return refused("oil", name, why, TWO)
     if re.search(r"cSt|mm\^?2/s", text, re.IGNORECASE):
         why = "is not understood (one viscosity says nothing of another temperature)"
     elif re.search(r"[A-Za-z]{3,}", text):
         why = "is not understood (for a brand write the ISO VG of its data sheet)"
     else:
         why = "is not understood"
-    return refused("oil", given, why, *forms)
+    return refused("oil", name, why, *forms)

@@ -51,24 +51,24 @@ class SaidKeys(Parameters):
 
     @classmethod
     def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
-        """The values without words of the trade, which are kept in `said`.  ValueError."""
-        values, said, piston = dict(given), texts(given.get("said")), of_piston(given)
+        """The values without words of the trade, which are kept in `terms`.  ValueError."""
+        values, terms, piston = dict(given), texts(given.get("said")), of_piston(given)
         for name in given:
             if name in LENGTHS and isinstance(values[name], str):
-                said += _length(name, values, piston)
+                terms += _length(name, values, piston)
         if "roughness" in given:
-            said += _finishes(values)
+            terms += _finishes(values)
         _oil(values)
         _require_stroke(values.get("stroke"))
         if isinstance(section := values.get("section"), str):
             values["section"] = read_section(section)
-        return super().worded({**values, "said": tuple(dict.fromkeys(said))} if said else values)
+        return super().worded({**values, "said": tuple(dict.fromkeys(terms))} if terms else values)
 
 
-def texts(said: object) -> list[str]:
-    """Return the texts of `said`; anything else is refused with its key."""
+def texts(value: object) -> list[str]:
+    """Return the texts of `value`; anything else is refused with its key."""
     return (
-        [text for text in said if isinstance(text, str)] if isinstance(said, list | tuple) else []
+        [text for text in value if isinstance(text, str)] if isinstance(value, list | tuple) else []
     )
 
 
@@ -78,16 +78,16 @@ def of_piston(values: Mapping[str, Any]) -> bool:
     return values.get("bore") is not None or (number(rod) and rod < 0.0)
 
 
-def bands(said: Sequence[str], *, piston: bool) -> Iterator[tuple[str, str, Band]]:
+def bands(terms: Sequence[str], *, piston: bool) -> Iterator[tuple[str, str, Band]]:
     """Keys that were given with limits, what was said, and these.  Raises NotUnderstoodError."""
-    for name, _, value in (text.partition(" = ") for text in said):
+    for name, _, value in (text.partition(" = ") for text in terms):
         if name not in LENGTHS:
             continue
-        if (found := _fit(name, value, piston)) is None:
+        if (band := _fit(name, value, piston)) is None:
             raise NotUnderstoodError(
                 f'said = "{name} = {value}" is not understood; write it in its own key'
             )
-        yield name, value, found
+        yield name, value, band
 
 
 def _fit(name: str, value: str, piston: bool) -> Band | None:
@@ -103,36 +103,36 @@ def _hole(name: str, piston: bool) -> bool | None:
 
 def with_limits(values: dict[str, Any]) -> dict[str, Any]:
     """The values with the middles of what has limits.  ValueError."""
-    said = texts(values.get("said"))
-    piston = of_piston(values) or any(text.startswith("bore = ") for text in said)
-    for name, value, found in bands(said, piston=piston):
+    terms = texts(values.get("said"))
+    piston = of_piston(values) or any(text.startswith("bore = ") for text in terms)
+    for name, value, band in bands(terms, piston=piston):
         for key_of in dict.fromkeys((name, LENGTHS[name])):
-            if number(before := values.get(key_of)) and before < 0.0:
+            if number(existing := values.get(key_of)) and existing < 0.0:
                 continue  # of a piston seal that is complete: minus this size, or minus its outside
-            put(values, key_of, found.middle, f'{name} = "{value}"')
+            put(values, key_of, band.middle, f'{name} = "{value}"')
     return values
 
 
-def understood(said: Sequence[str], *, piston: bool) -> list[str]:
+def understood(terms: Sequence[str], *, piston: bool) -> list[str]:
     """Lines that say how words of the trade were understood."""
-    words = [
-        f"{name} = {value}: {found.low:.10g} to {found.high:.10g} mm, solved at the middle, "
-        f"{found.middle:.10g}"
-        for name, value, found in bands(said, piston=piston)
+    lines = [
+        f"{name} = {value}: {band.low:.10g} to {band.high:.10g} mm, solved at the middle, "
+        f"{band.middle:.10g}"
+        for name, value, band in bands(terms, piston=piston)
     ]
-    for text in said:
+    for text in terms:
         name, _, value = text.partition(" = ")
         if name == "roughness" and (height := read_finish(value.partition(" ")[2])):
             factor = f", {RMS_OF_RA:.4g} Ra (normal distribution)" if "Ra" in value else ""
-            words.append(f"{name} of the {value}: {height:.4g} um rms{factor}")
-    return words
+            lines.append(f"{name} of the {value}: {height:.4g} um rms{factor}")
+    return lines
 
 
-def _require_stroke(given: object) -> None:
+def _require_stroke(value: object) -> None:
     """Raise NotUnderstoodError for another word for a stroke."""
-    for stroke, words in _STROKES.items():
-        if isinstance(given, str) and re.fullmatch(words, plain(given), re.IGNORECASE):
-            raise refused("stroke", given, "is another word for it", stroke)
+    for stroke, pattern in _STROKES.items():
+        if isinstance(value, str) and re.fullmatch(pattern, plain(value), re.IGNORECASE):
+            raise refused("stroke", value, "is another word for it", stroke)
 
 
 def _length(name: str, values: dict[str, Any], piston: bool) -> list[str]:
@@ -150,18 +150,18 @@ def _length(name: str, values: dict[str, Any], piston: bool) -> list[str]:
     raise refused(name, values[name], "is no size", "36 mm", usual)
 
 
-def rubber_named(given: dict[str, Any]) -> dict[str, Any]:
+def rubber_named(values_in: dict[str, Any]) -> dict[str, Any]:
     """The values with a rubber that is named in another key in `compound`.  ValueError."""
-    values = dict(given)
+    values = dict(values_in)
     for name in ("material", "shore_A"):
         text = values.get(name)
-        if not isinstance(text, str) or (found := read_rubber(name, text)) is None:
+        if not isinstance(text, str) or (rubber := read_rubber(name, text)) is None:
             continue
         del values[name]
-        before = values.setdefault("compound", found.text)
-        if before != found.text:
+        existing = values.setdefault("compound", rubber.text)
+        if existing != rubber.text:
             raise ValueError(
-                f'compound = "{before}" and {name} = "{text}" contradict: leave one of them out'
+                f'compound = "{existing}" and {name} = "{text}" contradict: leave one of them out'
             )
     return values
 
@@ -177,15 +177,15 @@ def _oil(values: dict[str, Any]) -> None:
 
 def _finishes(values: dict[str, Any]) -> list[str]:
     """Finishes of rod and seal, or of the seal alone, as rms heights."""
-    given = values["roughness"]
-    if isinstance(given, str) and " and " in given:
-        given = given.split(" and ")
-    several = isinstance(given, list | tuple)
-    items, parts = (list(given), ("rod", "seal")) if several else ([given], ("seal",))
-    said = []
+    finishes = values["roughness"]
+    if isinstance(finishes, str) and " and " in finishes:
+        finishes = finishes.split(" and ")
+    several = isinstance(finishes, list | tuple)
+    items, parts = (list(finishes), ("rod", "seal")) if several else ([finishes], ("seal",))
+    terms = []
     for n, item in enumerate(items[:2]):
         if isinstance(item, str) and (height := read_finish(item)) is not None:
             items[n] = height
-            said += [f"roughness = {parts[n]} {plain(item)}"]
+            terms += [f"roughness = {parts[n]} {plain(item)}"]
     values["roughness"] = items if several else items[0]
-    return said
+    return terms

@@ -72,83 +72,89 @@ _WORDS = form(
 )
 
 
-def read_ring(given: str) -> RingName:
+def read_ring(name: str) -> RingName:
     """The ring of a name.  Raises NotUnderstoodError."""
-    text = plain(given)
-    rest, kind = _without_kind(_STANDARD.sub(" ", text))
-    found = None if text.startswith("-") else _SIZE.fullmatch(rest) or _WORDS.fullmatch(rest)
-    if found:
-        sizes = found.groupdict()
+    text = plain(name)
+    remainder, kind = _without_kind(_STANDARD.sub(" ", text))
+    match = (
+        None if text.startswith("-") else _SIZE.fullmatch(remainder) or _WORDS.fullmatch(remainder)
+    )
+    if match:
+        sizes = match.groupdict()
         third = sizes.get("third")
         a, b = float(sizes["inner"]), float(sizes["section"])
         if third is None:
             if kind == "u_cup":
                 why = "is a U-cup, which is named by rod x groove diameter x width"
                 usual = f"U-cup {a:g}x{a + 2 * b:g}x{round(1.6 * b, 1):g}"
-                raise refused("ring", given, why, usual)
+                raise refused("ring", name, why, usual)
             return RingName(inner=a, section=b, kind=kind)
         if (kind is None and b > a) or (kind == "u_cup" and b != a):
             inner, outer, width = min(a, b), max(a, b), float(third)
             return RingName(inner=inner, kind="u_cup", outer=outer, width=width, bore_first=a > b)
-    if kind == "x_ring" and (found := _QUAD.fullmatch(rest)):
-        return RingName(number=int(found["number"]), kind=kind)
-    if (found := _DASH.fullmatch(rest)) and kind != "u_cup":
-        number = found["number"]
-        if not (found["said"] or found["dash"] or len(number) == 3):
+    if kind == "x_ring" and (match := _QUAD.fullmatch(remainder)):
+        return RingName(number=int(match["number"]), kind=kind)
+    if (match := _DASH.fullmatch(remainder)) and kind != "u_cup":
+        number = match["number"]
+        if not (match["said"] or match["dash"] or len(number) == 3):
             why = "is a number of AS568 or a diameter"
-            raise refused("ring", given, why, f"AS568-{int(number):03d}", f"{number}x3.55")
+            raise refused("ring", name, why, f"AS568-{int(number):03d}", f"{number}x3.55")
         return RingName(number=int(number), kind=kind)
-    raise _unknown(given, rest, kind)
+    raise _unknown(name, remainder, kind)
 
 
-def read_section(given: str) -> str:
+def read_section(word: str) -> str:
     """The section that a word of the trade means; any other text as it is."""
-    text = plain(given)
-    found = (name for name, words in _SECTIONS.items() if re.fullmatch(words, text, re.IGNORECASE))
-    return next(found, given)
+    text = plain(word)
+    sections = (
+        name for name, pattern in _SECTIONS.items() if re.fullmatch(pattern, text, re.IGNORECASE)
+    )
+    return next(sections, word)
 
 
 def _without_kind(text: str) -> tuple[str, Kind | None]:
     """A text without the word for a section, and which it is."""
     kinds: tuple[Kind, ...] = get_args(Kind)
     for kind in kinds:
-        found = re.search(rf"(?<![A-Za-z])(?:{_SECTIONS[kind]})(?![A-Za-z])", text, re.IGNORECASE)
-        if found:
-            text = f"{text[: found.start()]} {text[found.end() :]}"
+        match = re.search(rf"(?<![A-Za-z])(?:{_SECTIONS[kind]})(?![A-Za-z])", text, re.IGNORECASE)
+        if match:
+            text = f"{text[: match.start()]} {text[match.end() :]}"
             return " ".join(text.split()).strip(" ,;:-") or "", kind
     left = " ".join(text.split())
     return (left if re.fullmatch(r"-\d+", left) else left.strip(" ,;:-")), None
 
 
-def _unknown(given: str, rest: str, kind: Kind | None) -> Exception:
+def _unknown(name: str, remainder: str, kind: Kind | None) -> Exception:
     usual = ("36x4", "ISO 3601 50.4x3.55", "AS568-226")
-    if found := _COMPOUND.fullmatch(rest):
-        ring = found["ring"].strip(" ,;-/")
-        why = f"has its rubber in it, which is another key: material = {found['rubber']!r}"
-        return refused("ring", given, why.replace("'", '"'), ring)
-    if found := _POLYMER.fullmatch(rest):
+    if match := _COMPOUND.fullmatch(remainder):
+        ring = match["ring"].strip(" ,;-/")
+        why = f"has its rubber in it, which is another key: material = {match['rubber']!r}"
+        return refused("ring", name, why.replace("'", '"'), ring)
+    if match := _POLYMER.fullmatch(remainder):
         why = "has its rubber in it, which is another key: material, polymer and hardness"
-        return refused("ring", given, why, found["ring"].strip(" ,;-/"))
+        return refused("ring", name, why, match["ring"].strip(" ,;-/"))
     for section in ("d_ring", "rectangular", "trapezoid"):
-        if found := re.search(rf"\b(?:{_SECTIONS[section]})\b", rest, re.IGNORECASE):
-            size = f"{rest[: found.start()]} {rest[found.end() :]}".strip(" ,;-")
+        if match := re.search(rf"\b(?:{_SECTIONS[section]})\b", remainder, re.IGNORECASE):
+            size = f"{remainder[: match.start()]} {remainder[match.end() :]}".strip(" ,;-")
             why = f'has its section in it, which is another key: section = "{section}"'
             readable = _SIZE.fullmatch(size) or _DASH.fullmatch(size)
-            return refused("ring", given, why, size if readable else usual[0])
-    if found := re.fullmatch(r"(?:JIS ?(?:B ?2401)? ?)?([PGVS])-? ?(\d+)A?", rest, re.IGNORECASE):
-        size = f"{found[1].upper()}{found[2]}"
+            return refused("ring", name, why, size if readable else usual[0])
+    if match := re.fullmatch(
+        r"(?:JIS ?(?:B ?2401)? ?)?([PGVS])-? ?(\d+)A?", remainder, re.IGNORECASE
+    ):
+        size = f"{match[1].upper()}{match[2]}"
         why = f"is a size of JIS B 2401 ({size}), whose diameters are not in the catalogue"
-        return refused("ring", given, why, *usual[:2])
-    if found := _MILITARY.fullmatch(rest):
-        why = f"is a size of AS568 in the rubber of {found['name']}; give its material too"
-        return refused("ring", given, why, f"AS568-{found['number']}")
-    if re.match(r"AS[ -]?568", rest, re.IGNORECASE):
-        return refused("ring", given, "is no size of AS568, which have three digits", usual[2])
-    sizes = re.findall(NUMBER, rest)
-    if len(sizes) == 3 and (kind == "u_cup" or re.search(r"\dx[\d.]+x\d", rest)):
-        return refused("ring", given, "is not known", f"U-cup {'x'.join(sizes)}")
-    if len(sizes) == 2 and not re.search(r'"|/|\bin', rest):
+        return refused("ring", name, why, *usual[:2])
+    if match := _MILITARY.fullmatch(remainder):
+        why = f"is a size of AS568 in the rubber of {match['name']}; give its material too"
+        return refused("ring", name, why, f"AS568-{match['number']}")
+    if re.match(r"AS[ -]?568", remainder, re.IGNORECASE):
+        return refused("ring", name, "is no size of AS568, which have three digits", usual[2])
+    sizes = re.findall(NUMBER, remainder)
+    if len(sizes) == 3 and (kind == "u_cup" or re.search(r"\dx[\d.]+x\d", remainder)):
+        return refused("ring", name, "is not known", f"U-cup {'x'.join(sizes)}")
+    if len(sizes) == 2 and not re.search(r'"|/|\bin', remainder):
         large, small = sorted(map(float, sizes), reverse=True)
-        if 0.5 <= small <= min(20.0, 2.0 * large) and not re.search(r"[A-Za-z]\d", rest):
-            return refused("ring", given, "is not known", f"{large:g}x{small:g}", usual[2])
-    return refused("ring", given, "is not known", *usual)
+        if 0.5 <= small <= min(20.0, 2.0 * large) and not re.search(r"[A-Za-z]\d", remainder):
+            return refused("ring", name, "is not known", f"{large:g}x{small:g}", usual[2])
+    return refused("ring", name, "is not known", *usual)

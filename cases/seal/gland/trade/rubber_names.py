@@ -71,17 +71,17 @@ class RubberName:
 def read_rubber(key: str, given: str) -> RubberName | None:
     """The rubber of a name, None where the text is not like one.  Raises NotUnderstoodError."""
     text = plain(given)
-    for known in _FORMS:
-        if found := known.fullmatch(text):
-            return _read(key, given, found.groupdict())
+    for pattern in _FORMS:
+        if match := pattern.fullmatch(text):
+            return _read(key, given, match.groupdict())
     if is_plastic(text):
         why = "is a plastic, no rubber: it may be a cap, cap_thickness and materials.cap"
         raise refused(key, given, why)
     if short := re.fullmatch(r"([NVES]) ?-?(\d\d)", text, re.IGNORECASE):
         name = _SHORT[short[1].upper()]
         raise refused(key, given, "is a maker's short name", f"{name} {short[2]}")
-    if found := re.match(rf"{_POLYMER}[ /-]*(?P<shore>\d\d)\b", text, re.IGNORECASE):
-        shorter = _read(key, given, found.groupdict()).text
+    if match := re.match(rf"{_POLYMER}[ /-]*(?P<shore>\d\d)\b", text, re.IGNORECASE):
+        shorter = _read(key, given, match.groupdict()).text
         raise refused(key, given, "says more than polymer and hardness", shorter)
     if shore := re.search(r"(?<!\d)[1-9]\d(?!\d)", text):
         forms = ("NBR 70", "FKM 75", "EPDM 80", "PU 95", f"{shore[0]} Shore A")
@@ -94,16 +94,16 @@ def is_plastic(text: str) -> bool:
     return _PLASTICS.fullmatch(plain(text)) is not None
 
 
-def _read(key: str, given: str, found: dict[str, str | None]) -> RubberName:
-    name = found.get("name")
+def _read(key: str, text: str, groups: dict[str, str | None]) -> RubberName:
+    name = groups.get("name")
     polymer = next((n for w, n in _SPELT.items() if name and re.fullmatch(w, name, re.I)), None)
-    if found["shore"] is None:
+    if groups["shore"] is None:
         usual = 95 if polymer == "PU" else 70
-        raise refused(key, given, "needs its hardness in Shore A", f"{polymer} {usual}")
-    shore, scale = float(found["shore"]), (found.get("scale") or "A").upper()
+        raise refused(key, text, "needs its hardness in Shore A", f"{polymer} {usual}")
+    shore, scale = float(groups["shore"]), (groups.get("scale") or "A").upper()
     if scale == "D":
         why = "is a hardness Shore D; write that in Shore A, or the shear modulus, mu"
-        raise refused(key, given, why, f"{polymer or 'PU'} 95")
+        raise refused(key, text, why, f"{polymer or 'PU'} 95")
     if not 10.0 <= shore < 100.0:
-        raise refused(key, given, "is no hardness Shore A", f"{polymer or 'NBR'} 70")
+        raise refused(key, text, "is no hardness Shore A", f"{polymer or 'NBR'} 70")
     return RubberName(polymer, shore)
