@@ -38,7 +38,7 @@ from softehl.runtime.definition.element_blocks import (
     form_of,
     geometry_of,
 )
-from softehl.runtime.definition.kernel_loading import Origin, Source
+from softehl.runtime.definition.kernel_loading import KernelOrigin, Source
 from softehl.runtime.definition.problem_definition import (
     Datum,
     ProblemDefinition,
@@ -53,7 +53,7 @@ from softehl.runtime.fit import least_squares
 from softehl.runtime.fit import objective as inverse
 from softehl.runtime.fit.jax_operation import Operation
 from softehl.runtime.fit.least_squares import Bounds, Fit, Measured
-from softehl.runtime.fit.objective import Objective, Trials, varied_definition
+from softehl.runtime.fit.objective import Objective, StudyEvaluations, varied_definition
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.parallel.engine import AnyEngine
 from softehl.runtime.parallel.linear_solver_choice import Linear
@@ -86,13 +86,13 @@ class Study:
 
     mesh: Mesh
     geometry: str | None = None
-    _statement: ProblemDefinition = field(init=False, repr=False)
+    _definition: ProblemDefinition = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Raises MeshError for a cell that is turned inside out, StudyError for a geometry."""
         self.mesh.check()
         geometry_of(self.mesh, self.geometry)
-        self._statement = ProblemDefinition(self.mesh, self._ring)
+        self._definition = ProblemDefinition(self.mesh, self._axisymmetric)
 
     def __setattr__(self, name: str, value: object) -> None:
         """Raises AttributeError for what a study is of."""
@@ -104,10 +104,10 @@ class Study:
 
     def __repr__(self) -> str:
         """Summary in one line."""
-        written = self._statement
-        blocks = short_list(f"{b.name} ({b.kernel.name})" for b in written.blocks.values())
-        calls = Counter(["fix"] * len(written.conditions) + [f.what for f in written.forces])
-        calls.update(start=len(written.start), contact=len(written.contacts))
+        definition = self._definition
+        blocks = short_list(f"{b.name} ({b.kernel.name})" for b in definition.blocks.values())
+        calls = Counter(["fix"] * len(definition.conditions) + [f.what for f in definition.forces])
+        calls.update(start=len(definition.start), contact=len(definition.contacts))
         summary = (
             ", ".join(f"{count} {name}" for name, count in calls.items() if count) or "no loads"
         )
@@ -115,8 +115,8 @@ class Study:
         return f"<Study: {kinds}; blocks: {blocks}; {summary}>"
 
     def __copy__(self) -> Study:
-        """A study with the same statements so far, on the same mesh."""
-        return self._with_definition(self._statement.copy())
+        """A study with a copy of the definition, on the same mesh."""
+        return self._with_definition(self._definition.copy())
 
     def __deepcopy__(self, memo: object) -> Study:
         """As a copy: what was written down does not change."""
@@ -125,7 +125,7 @@ class Study:
     def _with_definition(self, definition: ProblemDefinition) -> Study:
         """A study with the same geometry and another definition."""
         other = object.__new__(type(self))
-        vars(other).update({**vars(self), "mesh": definition.mesh, "_statement": definition})
+        vars(other).update({**vars(self), "mesh": definition.mesh, "_definition": definition})
         return other
 
     # definition ---------------------------------------------------------------------------------
@@ -196,9 +196,9 @@ class Study:
         """
         geometry = geometry_of(self.mesh, self.geometry)
         add_block(
-            self._statement,
+            self._definition,
             name,
-            Origin.of(name, source, material=material, model=model, geometry=geometry),
+            KernelOrigin.of(name, source, material=material, model=model, geometry=geometry),
             form_of(name, shared, called, along, rule, constant),
             on=elements_on(name, on),
             cells=cells,
@@ -230,7 +230,7 @@ class Study:
         On straight sides of cells of order p, polynomials of degree p + 2 are integrated exactly. A
         body force is a page.
         """
-        loads_and_supports.add_load(self._statement, where, components)
+        loads_and_supports.add_load(self._definition, where, components)
 
     def pressure(
         self, where: str | Predicate, value: Amount, *, of: Sequence[str] | None = None
@@ -255,7 +255,7 @@ class Study:
         MeshError
             A face belongs to two cells or to none: it has no outside.
         """
-        loads_and_supports.add_pressure(self._statement, where, value, of)
+        loads_and_supports.add_pressure(self._definition, where, value, of)
 
     def spring(self, where: Where, **stiffness: float) -> None:
         """Add a spring to the ground at each node of a side.
@@ -274,7 +274,7 @@ class Study:
         MeshError
             The mesh has no such side or node.
         """
-        loads_and_supports.add_springs(self._statement, where, stiffness)
+        loads_and_supports.add_springs(self._definition, where, stiffness)
 
     def fix(self, where: Where, **values: Amount) -> None:
         """Prescribe unknowns at nodes.
@@ -294,7 +294,7 @@ class Study:
         MeshError
             The mesh has no such side or node.
         """
-        loads_and_supports.add_conditions(self._statement, where, values)
+        loads_and_supports.add_conditions(self._definition, where, values)
 
     def tie(
         self, where: Where, to: Where, *names: str, offset: Amount = 0.0, tolerance: float = 1e-6
@@ -327,7 +327,7 @@ class Study:
         Nodes at one place that belong to bodies without a connection are tied body by body.
         """
         loads_and_supports.add_ties(
-            self._statement, where, to, names, offset=offset, tolerance=tolerance
+            self._definition, where, to, names, offset=offset, tolerance=tolerance
         )
 
     def contact(
@@ -371,7 +371,7 @@ class Study:
             The mesh has no such side.
         """
         add_contact(
-            self._statement,
+            self._definition,
             name,
             (side, other),
             of,
@@ -398,7 +398,7 @@ class Study:
         MeshError
             The mesh has no such side or node.
         """
-        loads_and_supports.add_initial_values(self._statement, where, values)
+        loads_and_supports.add_initial_values(self._definition, where, values)
 
     # analyses -----------------------------------------------------------------------------------
 
@@ -421,7 +421,7 @@ class Study:
         StudyError
             Statements contradict each other.
         """
-        return build_system(self._statement, fields)
+        return build_system(self._definition, fields)
 
     def solve(
         self,
@@ -483,7 +483,7 @@ class Study:
             The end is not reached; its `reached` is the last Result, or None.
         """
         return load_stepping.solve(
-            self._statement,
+            self._definition,
             steps=steps,
             until=until,
             start=start,
@@ -586,7 +586,7 @@ class Study:
         `Model.rates`) are renewed.
         """
         return time_stepping.march(
-            self._statement,
+            self._definition,
             dt=dt,
             until=until,
             method=method,
@@ -669,7 +669,7 @@ class Study:
         the path does not depend on `step` (docs/study.md). History is committed after each point.
         """
         return arc_length_path.follow(
-            self._statement,
+            self._definition,
             step=step,
             until=until,
             start=start,
@@ -700,7 +700,7 @@ class Study:
         StudyError
             Sides of a pair have different nodes.
         """
-        return homogenisation.periodic_cell(self._statement, pairs, tolerance)
+        return homogenisation.periodic_cell(self._definition, pairs, tolerance)
 
     def modes(
         self,
@@ -741,7 +741,7 @@ class Study:
             The state is not in equilibrium, or the body has no mass.
         """
         return analyses_modes.modes(
-            self._statement,
+            self._definition,
             count,
             mass=mass,
             start=start,
@@ -791,7 +791,7 @@ class Study:
         proportion; a factor is where it becomes singular.
         """
         return analyses_buckling.buckling(
-            self._statement,
+            self._definition,
             count,
             start=start,
             options=SolverOptions.merged(options, newton=newton, engine=engine),
@@ -816,7 +816,7 @@ class Study:
         StudyError
             The study has no such input, or a value has a wrong shape.
         """
-        return self._with_definition(varied_definition(self._statement, values))
+        return self._with_definition(varied_definition(self._definition, values))
 
     def objective(
         self,
@@ -855,7 +855,7 @@ class Study:
             The study has no such input.
         """
         return inverse.objective(
-            self._statement, what, by=by, at=at, reaction=reaction, arguments=path
+            self._definition, what, by=by, at=at, reaction=reaction, arguments=path
         )
 
     def in_jax(self, *, by: By, **path: Any) -> Operation:
@@ -879,7 +879,7 @@ class Study:
         StudyError
             The study has no such input.
         """
-        return Operation(Trials.by(self._statement, by, path))
+        return Operation(StudyEvaluations.by(self._definition, by, path))
 
     def fit(
         self,
@@ -925,7 +925,7 @@ class Study:
             The study has no solution for the present values.
         """
         return least_squares.fit(
-            self._statement,
+            self._definition,
             measured,
             by=by,
             bounds=bounds,
@@ -935,7 +935,7 @@ class Study:
         )
 
     @property
-    def _ring(self) -> bool:
+    def _axisymmetric(self) -> bool:
         """True if sides are those of rings."""
         return self.geometry == "axisymmetric"
 

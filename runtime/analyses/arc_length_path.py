@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from softehl.runtime.analyses.bifurcation import Bifurcation, Detector, require_detect
+from softehl.runtime.analyses.bifurcation import Bifurcation, BifurcationDetector, require_detect
 from softehl.runtime.analyses.initial_state import InitialState, initial_state
 from softehl.runtime.analyses.load_stepping import LOAD_FACTOR, LoadHistory
 from softehl.runtime.analyses.solver_options import SolverOptions
@@ -92,7 +92,7 @@ def follow(
         else:
             arclength, x = _scaled_by_mode(arclength, system, initial, other_branch), initial.x
             leave = np.append(other_branch.mode.x, 0.0)
-        detector = Detector(system, newton, skip=leave is not None)
+        detector = BifurcationDetector(system, newton, skip=leave is not None)
 
         def path_ends(branch: Branch) -> bool:
             if detect is not None:

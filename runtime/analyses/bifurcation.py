@@ -64,7 +64,7 @@ class Bifurcation:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class CriticalPoint:
     """A point near a bifurcation: the eigenvalue next to zero, and its vector (n,)."""
 
     t: float
@@ -74,7 +74,7 @@ class Place:
 
 
 @dataclass(eq=False)
-class Detector:
+class BifurcationDetector:
     """Looks at a path after each of its points.
 
     skip: the first point is on a bifurcation itself. folds: limit points that were met. blind: it
@@ -124,9 +124,9 @@ class Detector:
                 solution = self.newton.solve(problem, a.x + share * (b.x - a.x))
             if not solution.converged:
                 break
-            moved = abs(t - nearest.t)
+            change = abs(t - nearest.t)
             nearest = critical_point(problem, t, solution.x)
-            located = moved <= _LOCATED * max(abs(t), abs(after.t - previous.t))
+            located = change <= _LOCATED * max(abs(t), abs(after.t - previous.t))
             if located or nearest.value == 0.0:
                 located = True
                 break
@@ -138,7 +138,7 @@ class Detector:
         return self._bifurcation(previous, nearest, directions, located=located)
 
     def _bifurcation(
-        self, previous: Result, critical: Place, directions: int, *, located: bool
+        self, previous: Result, critical: CriticalPoint, directions: int, *, located: bool
     ) -> Bifurcation:
         old, histories = previous.point.solution.x, previous.histories
         problem = self.system.problem(self.system.quasi_static_step(critical.t, old, histories)).at(
@@ -150,13 +150,13 @@ class Detector:
         return Bifurcation(state, ModeShape.of(state, mode), directions, located)
 
 
-def critical_point(problem: Problem, t: float, x: Array) -> Place:
+def critical_point(problem: Problem, t: float, x: Array) -> CriticalPoint:
     """Of a problem at unknowns x, (n,), with the contacts that it has there."""
     contact_problem = problem.at(x)
     K = contact_problem.assembler.linearise(x, contact_problem.parameters)[1]
     free = Constraints.of(contact_problem, K)
     value, mode = nearest_zero(symmetric(free.matrix(K)))
-    return Place(t, x, value, free.map @ mode)
+    return CriticalPoint(t, x, value, free.map @ mode)
 
 
 def displacements(system: System, x: Array) -> Array:

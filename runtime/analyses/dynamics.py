@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from softehl.runtime.analyses.equations_of_motion import Body
+from softehl.runtime.analyses.equations_of_motion import EquationsOfMotion
 from softehl.runtime.analyses.explicit_dynamics import ExplicitMarch
 from softehl.runtime.analyses.initial_state import SMALLEST, initial_state
 from softehl.runtime.analyses.motion import (
+    EnergyBalance,
     Forces,
-    Ledger,
     Motion,
     MotionState,
     parameter_work,
@@ -75,7 +75,7 @@ def march_with_inertia(
     state = MotionState(initial.t, initial.x, v, np.zeros_like(initial.x), initial.histories)
     at_rest = Step(state.t, 1.0, state.x, 0.0, v, dt, state.histories)
     implicit = None if isinstance(integrator, CentralDifference) else integrator
-    body = Body.of(system, mass, implicit, at_rest)
+    body = EquationsOfMotion.of(system, mass, implicit, at_rest)
     if isinstance(integrator, CentralDifference):
         state = _with_supports(body, state, body.at_end(at_rest, v), dt)
         motions = ExplicitMarch.of(integrator, dt, body, state).run(until)
@@ -112,24 +112,27 @@ def _nodal_rates(system: System, start: Motion, rates: Callable[[str], Array]) -
     return values
 
 
-def _continues(body: Body, start: Motion, integrator: SecondOrderIntegrator) -> bool:
+def _continues(body: EquationsOfMotion, start: Motion, integrator: SecondOrderIntegrator) -> bool:
     """True if the start is a motion of the same study by the same integrator: it continues as if
     it had not stopped.
     """
-    system, previous = body.plain, start.system
+    system, previous = body.static_system, start.system
     if start.scheme != integrator:
         return False
     if start.mass is not body.mass and repr(start.mass) != repr(body.mass):
         return False
-    same = previous.statement is system.statement and previous.written == system.written
-    return same and system.statement is not None
+    same = (
+        previous.definition is system.definition
+        and previous.definition_size == system.definition_size
+    )
+    return same and system.definition is not None
 
 
 def _continued(
-    march: ImplicitMarch, body: Body, start: Motion, state: MotionState, until: float
+    march: ImplicitMarch, body: EquationsOfMotion, start: Motion, state: MotionState, until: float
 ) -> Iterator[Motion]:
     """Continue a motion with its accelerations and forces."""
-    system = body.plain
+    system = body.static_system
     if system.comm.rank_and_size[1] > 1:  # of which each has its own unknowns
         a = _nodal_rates(system, start, start.acceleration)
         return march.run(body, replace(state, a=a), until)
@@ -137,19 +140,21 @@ def _continued(
     return march.run(body, state, until, system.comm.local_problem(start.problem))
 
 
-def _with_supports(body: Body, state: MotionState, problem: Problem, dt: float) -> MotionState:
+def _with_supports(
+    body: EquationsOfMotion, state: MotionState, problem: Problem, dt: float
+) -> MotionState:
     """The state with prescribed values and their velocities; massless unknowns have none."""
     x, v, step = problem.admissible(state.x), state.v.copy(), _SUPPORT_STEP * dt
-    later = body.plain.local_problem(
+    later = body.static_system.local_problem(
         Step(state.t + step, 1.0, x, 0.0, state.v, dt, state.histories)
     )
     v[problem.fixed] = (later.values - problem.values) / step
-    v[~body.heavy] = 0.0
+    v[~body.has_mass] = 0.0
     return replace(state, x=x, v=v)
 
 
 def _consistent_state(
-    body: Body, state: MotionState, problem: Problem, dt: float, newton: Newton
+    body: EquationsOfMotion, state: MotionState, problem: Problem, dt: float, newton: Newton
 ) -> MotionState:
     """The state with unknowns without mass and multipliers in equilibrium, and accelerations.
 
@@ -160,27 +165,33 @@ def _consistent_state(
     elif body.comm.max(float(body.algebraic(problem).any())):
         state = replace(state, x=_massless_equilibrium(body, problem, state.x, newton))
     problem = body.at_end(state.ended_step(dt), state.v)
-    return replace(state, a=body.started(problem, state.x))
+    return replace(state, a=body.initial_accelerations(problem, state.x))
 
 
-def _constrained_state(body: Body, state: MotionState, dt: float, newton: Newton) -> MotionState:
+def _constrained_state(
+    body: EquationsOfMotion, state: MotionState, dt: float, newton: Newton
+) -> MotionState:
     """The state that supports, ties and contacts admit, with the unknowns without mass.
 
     Of three short steps of backward Euler the first finds the displacements, the second, again with
     the given velocities, the velocities, and the third the forces.
     """
-    h = min(_CONSISTENT_STEP * dt, _SLOW / body.fastest(state.ended_step(dt)))
-    short = Body.of(body.plain, body.mass, BackwardEulerDynamics(), state.ended_step(dt))
+    h = min(_CONSISTENT_STEP * dt, _SLOW / body.highest_frequency(state.ended_step(dt)))
+    short = EquationsOfMotion.of(
+        body.static_system, body.mass, BackwardEulerDynamics(), state.ended_step(dt)
+    )
     first, _ = _backward_euler_step(short, state, h, newton)
     second, v = _backward_euler_step(short, replace(first, v=state.v), h, newton)
     third, later_v = _backward_euler_step(short, replace(second, v=v), h, newton)
-    x = np.where(body.heavy, first.x - h * v, third.x)
+    x = np.where(body.has_mass, first.x - h * v, third.x)
     return replace(state, x=x, v=2.0 * v - later_v)
 
 
-def _massless_equilibrium(body: Body, problem: Problem, x: Array, newton: Newton) -> Array:
+def _massless_equilibrium(
+    body: EquationsOfMotion, problem: Problem, x: Array, newton: Newton
+) -> Array:
     """Unknowns x, (n,), in which those without mass satisfy their equations."""
-    fixed = np.union1d(problem.fixed, np.flatnonzero(body.heavy))
+    fixed = np.union1d(problem.fixed, np.flatnonzero(body.has_mass))
     massless = replace(problem, fixed=fixed, values=x[fixed])
     with np.errstate(all="ignore"):
         solution = newton.solve(body.comm.distribute(massless), x)
@@ -188,12 +199,12 @@ def _massless_equilibrium(body: Body, problem: Problem, x: Array, newton: Newton
 
 
 def _backward_euler_step(
-    body: Body, state: MotionState, h: float, newton: Newton
+    body: EquationsOfMotion, state: MotionState, h: float, newton: Newton
 ) -> tuple[MotionState, Array]:
     """The end of a step of length h, and the velocities there.  Raises StudyError."""
     integrator = BackwardEulerDynamics()
     step, velocity = _implicit_step(integrator, body, state, h)
-    problem = body.moving.comm.distribute(body.problem(step, 1.0, 0.0 * state.x))
+    problem = body.dynamic_system.comm.distribute(body.problem(step, 1.0, 0.0 * state.x))
     with np.errstate(all="ignore"):
         solution = newton.solve(problem, state.x)
     if not solution.converged:
@@ -201,12 +212,12 @@ def _backward_euler_step(
             f"t = {state.t:.6g}: no accelerations at the start go with its supports, ties and "
             f"contacts: {solution.message}"
         )
-    v = np.where(body.heavy, velocity.at(solution.x), 0.0)
+    v = np.where(body.has_mass, velocity.at(solution.x), 0.0)
     return replace(state, t=state.t + h, x=solution.x), v
 
 
 def _implicit_step(
-    integrator: SecondOrderIntegrator, body: Body, state: MotionState, dt: float
+    integrator: SecondOrderIntegrator, body: EquationsOfMotion, state: MotionState, dt: float
 ) -> tuple[Step, Affine]:
     """A step of length dt from a state, and the velocity in its equation."""
     velocity = integrator.equation_velocity(dt, state)
@@ -230,13 +241,13 @@ class ImplicitMarch:
     newton: Newton
 
     def run(
-        self, body: Body, state: MotionState, until: float, end: Problem | None = None
+        self, body: EquationsOfMotion, state: MotionState, until: float, end: Problem | None = None
     ) -> Iterator[Motion]:
         """Yield each converged step.  Raises NotConverged.
 
         end: equations without inertia of the step that ended at the state, if there was one.
         """
-        ledger, log = Ledger(body.comm), PathLog("t")
+        ledger, log = EnergyBalance(body.comm), PathLog("t")
         stepper = _ImplicitStepper(self, body, state, until, ledger, equations=end)
         for _ in path_points(stepper, StepRule(self.dt, SMALLEST * self.dt), log):
             log.points = log.points[-1:]
@@ -255,10 +266,10 @@ class _ImplicitStepper(Stepper):
     """
 
     march: ImplicitMarch
-    body: Body
+    body: EquationsOfMotion
     state: MotionState
     until: float
-    ledger: Ledger
+    ledger: EnergyBalance
     result: Motion | None = None
     equations: Problem | None = None
     forces: Forces | None = None
@@ -281,7 +292,7 @@ class _ImplicitStepper(Stepper):
         assert self.forces is not None
         initial_forces = integrator.initial_weight * self.forces.total
         problem = body.problem(time_step, integrator.load_time, initial_forces)
-        newton, distributed = self.march.newton, body.moving.comm.distribute(problem)
+        newton, distributed = self.march.newton, body.dynamic_system.comm.distribute(problem)
         x = body.weighted(state.x, 1.0 / body.weight)
         with np.errstate(all="ignore"):
             solution = newton.solve(distributed, x + dt * state.v)
@@ -299,10 +310,10 @@ class _ImplicitStepper(Stepper):
         previous, body, step, x = self.state, self.body, self._attempt, attempt.solution.x
         integrator = self.march.integrator
         acceleration = integrator.acceleration(step.dt, previous).at(x)
-        v = np.where(body.heavy, integrator.velocity(step.dt, previous).at(x), 0.0)
-        a = np.where(body.heavy, acceleration, 0.0)
+        v = np.where(body.has_mass, integrator.velocity(step.dt, previous).at(x), 0.0)
+        a = np.where(body.has_mass, acceleration, 0.0)
         end = body.at_end(step, v)
-        histories = body.plain.committed(end, x, previous.histories)
+        histories = body.static_system.committed(end, x, previous.histories)
         initial_forces, supports, initial_equations = self.forces, self.supports, self.equations
         state = MotionState(step.t, x, v, a, histories)
         self._set_state(end, state, Forces.of(end, x, body.roles))
@@ -321,7 +332,7 @@ class _ImplicitStepper(Stepper):
         supports = supports + _at_supports(end, mean.constraints)
         displacement = x - previous.x
         self.ledger.add(mean, supports, displacement)
-        self.ledger.others += body.friction(end, x, displacement)
+        self.ledger.others += body.friction_work(end, x, displacement)
         self.ledger.external += parameter_work(
             initial_equations, end, body.roles, (previous.x, x), middle
         )
@@ -346,7 +357,7 @@ class _ImplicitStepper(Stepper):
 
     def _motion(self, end: Problem, state: MotionState, solution: Solution) -> Motion:
         return Motion(
-            self.body.plain,
+            self.body.static_system,
             self.body.comm.distribute(end.at(state.x)),
             Point(state.t, solution),
             state.histories,

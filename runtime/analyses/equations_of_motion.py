@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
-from softehl.runtime.analyses.motion import Forces, Roles
+from softehl.runtime.analyses.motion import EnergyRoles, Forces
 from softehl.runtime.analyses.time_integrators import Affine, SecondOrderIntegrator
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.contact.search import ContactProblem
@@ -35,7 +35,7 @@ _EXACT, _MOST = 1e-14, 1000  # of accelerations at the start; the mass is well c
 
 
 @dataclass(frozen=True, eq=False)
-class _Known:
+class _ConstantForces:
     """Forces as a kernel, (n, 1): its data."""
 
     name = _BEFORE
@@ -54,7 +54,7 @@ class _Known:
 
 
 @dataclass(frozen=True, eq=False)
-class _Scaled:
+class _ScaledKernel:
     """A kernel whose equations are multiplied by the last columns of its data."""
 
     kernel: Any
@@ -67,12 +67,12 @@ class _Scaled:
 
     def residual(self, coordinates: Array, dofs: Array, **arguments: Any) -> Array:
         """Residuals (n, ndof)."""
-        inner_arguments, factors = self._parted(dofs, arguments)
+        inner_arguments, factors = self._split_factors(dofs, arguments)
         return np.asarray(factors * self.kernel.residual(coordinates, dofs, **inner_arguments))
 
     def tangent(self, coordinates: Array, dofs: Array, **arguments: Any) -> tuple[Array, Array]:
         """Residuals and tangents (n, ndof, ndof)."""
-        inner_arguments, factors = self._parted(dofs, arguments)
+        inner_arguments, factors = self._split_factors(dofs, arguments)
         r, K = self.kernel.tangent(coordinates, dofs, **inner_arguments)
         return factors * r, factors[:, :, None] * K
 
@@ -80,32 +80,34 @@ class _Scaled:
         """None, (n, 0, 0)."""
         return np.empty((len(dofs), 0, 0))
 
-    def _parted(self, dofs: Array, arguments: dict[str, Any]) -> tuple[dict[str, Any], Array]:
+    def _split_factors(
+        self, dofs: Array, arguments: dict[str, Any]
+    ) -> tuple[dict[str, Any], Array]:
         inner_data, factors = np.split(arguments["data"], [-dofs.shape[1]], axis=1)
         data = np.ascontiguousarray(inner_data) if inner_data.shape[1] else None
         return {**arguments, "data": data}, factors
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
-    """A study with inertia.
+class EquationsOfMotion:
+    """Equations of motion of a study.
 
-    plain: its equations without. moving: with elements of mass, and forces of the step before or
-    averaged. M: consistent masses (n, n) at the start. lumps: (n,), of the explicit
-    scheme; both are what elements of this process add. heavy: unknowns with mass. roles: of its
-    blocks. weight: of the forces at the end of a step in `moving`; ties and contacts act through
+    static_system: without inertia. dynamic_system: with elements of mass, and initial or averaged
+    forces. M: consistent masses (n, n) at the start. lumped_masses: (n,), of the explicit scheme;
+    both are what elements of this process add. has_mass: unknowns with mass. roles: of its blocks.
+    weight: of the forces at the end of a step in `dynamic_system`; ties and contacts act through
     the whole step, so that their unknowns there are those of the study over the weight. mass:
-    densities as they were given. factors: (n,) of equations in `moving`: the forces of ties and
+    densities by block. factors: (n,) of equations in `dynamic_system`: the forces of ties and
     contacts on unknowns without mass, too, are those of the study over the weight. constrained:
     (n,) multipliers of ties, contacts and pages.
     """
 
-    plain: System
-    moving: System
+    static_system: System
+    dynamic_system: System
     M: csc_array
-    lumps: Array
-    heavy: Flags
-    roles: Roles
+    lumped_masses: Array
+    has_mass: Flags
+    roles: EnergyRoles
     weight: float = 1.0
     mass: Masses | None = None
     factors: Array = field(default_factory=lambda: np.empty(0))
@@ -114,21 +116,21 @@ class Body:
     @classmethod
     def of(
         cls, system: System, mass: Masses | None, integrator: SecondOrderIntegrator | None, at: Step
-    ) -> Body:
+    ) -> EquationsOfMotion:
         """Raises StudyError where there is no mass, or where a rate belongs to none."""
         problem, blocks = system.local_problem(at), mass_blocks(system, mass)
         comm, M = system.comm, mass_matrix(system, problem, at.old, mass)
         heavy = comm.sum_shared(M.diagonal()) > 0.0
         for block in system.blocks.values():
             for slot in block.rates.values():
-                numbers = system.numbering.nodal[slot.name]
-                if comm.max(float(not heavy[numbers[numbers >= 0]].all())):
+                dofs = system.numbering.nodal[slot.name]
+                if comm.max(float(not heavy[dofs[dofs >= 0]].all())):
                     raise StudyError(
                         f"{block.name!r} has a rate of {slot.name}, which has no mass everywhere: "
                         'give it one, or march by "euler" or "bdf2"'
                     )
         roles, weight = (
-            Roles.in_system(system),
+            EnergyRoles.in_system(system),
             1.0 if integrator is None else integrator.final_weight,
         )
         element_blocks = list(system.assembler.blocks)
@@ -154,7 +156,7 @@ class Body:
         rows = comm.owned(system.size)
         rows = rows[heavy[rows]][:, None]
         force_block = ElementBlock(
-            _BEFORE, _Known(), np.empty((0, 0)), rows, check_orientation=False
+            _BEFORE, _ConstantForces(), np.empty((0, 0)), rows, check_orientation=False
         )
         assembler = Assembler.build(system.size, [*element_blocks, *blocks, force_block])
         lumps = _lumped(system, M, blocks) if integrator is None else M.diagonal()
@@ -168,7 +170,7 @@ class Body:
     @property
     def comm(self) -> Communicator:
         """Distribution of its unknowns over processes."""
-        return self.plain.comm
+        return self.static_system.comm
 
     def problem(self, step: Step, load_time: float, initial_forces: Array) -> Problem:
         """Equations of a step that ends at step.t: loads of a place in it, supports of its end.
@@ -176,8 +178,10 @@ class Body:
         initial_forces: (n,) forces that are added where there is mass.
         """
         initial_forces = self.comm.sum_shared(initial_forces)
-        problem = self.moving.local_problem(replace(step, t=step.t - (1.0 - load_time) * step.dt))
-        end = problem if load_time == 1.0 else self.plain.local_problem(step)
+        problem = self.dynamic_system.local_problem(
+            replace(step, t=step.t - (1.0 - load_time) * step.dt)
+        )
+        end = problem if load_time == 1.0 else self.static_system.local_problem(step)
         remainder = (
             np.zeros(len(initial_forces))
             if step.acceleration_offset is None
@@ -190,11 +194,11 @@ class Body:
                 changed = with_old(block, step.old)
             elif isinstance(block.kernel, MassKernel):
                 changed = replace(block, data=np.ascontiguousarray(remainder[block.dofs]))
-            elif isinstance(block.kernel, _Known):
+            elif isinstance(block.kernel, _ConstantForces):
                 changed = replace(block, data=initial_forces[block.dofs])
             elif isinstance(block.kernel, Tie):
                 parameters[block.name] = end.parameters[block.name]
-            if isinstance(block.kernel, _Scaled):
+            if isinstance(block.kernel, _ScaledKernel):
                 columns = self.factors[block.dofs]
                 data = [columns] if block.data is None else [block.data, columns]
                 changed = replace(block, data=np.ascontiguousarray(np.concatenate(data, axis=1)))
@@ -210,13 +214,13 @@ class Body:
 
     def algebraic(self, problem: Problem) -> Flags:
         """Free unknowns (n,) without mass, which follow from the others without rates."""
-        massless = ~self.heavy
+        massless = ~self.has_mass
         massless[problem.fixed] = False
         return massless
 
-    def fastest(self, at: Step) -> float:
+    def highest_frequency(self, at: Step) -> float:
         """Highest angular frequency of the mesh, estimated by the diagonals of the tangent."""
-        problem = self.plain.local_problem(at)
+        problem = self.static_system.local_problem(at)
         with np.errstate(all="ignore"):
             K = problem.assembler.linearise(at.old, problem.parameters)[1]
         stiff, mass = (self.comm.sum_shared(A.diagonal()) for A in (K, self.M))
@@ -230,23 +234,23 @@ class Body:
         scaled[self.roles.multipliers] *= weight
         return scaled
 
-    def friction(self, problem: Problem, x: Array, moved: Array) -> float:
+    def friction_work(self, problem: Problem, x: Array, displacement: Array) -> float:
         """Work of friction at the end x of a step in which the unknowns moved (n,)."""
-        if not any(contact.friction for contact in self.plain.contacts):
+        if not any(contact.friction for contact in self.static_system.contacts):
             return 0.0
         assert isinstance(problem, ContactProblem)
-        smooth = tuple(replace(c, friction=0.0) for c in self.plain.contacts)  # type: ignore[type-var]
+        smooth = tuple(replace(c, friction=0.0) for c in self.static_system.contacts)  # type: ignore[type-var]
         other = replace(problem, contacts=smooth, latest=[])
         total, normal = (Forces.of(p, x, self.roles).contact for p in (problem, other))
-        return float((total - normal) @ moved)
+        return float((total - normal) @ displacement)
 
     def at_end(self, step: Step, v: Array) -> Problem:
         """The plain equations at the end of a step, with velocities v, (n,)."""
-        return self.plain.local_problem(
+        return self.static_system.local_problem(
             replace(step, rate=0.0, rate_offset=v, acceleration=0.0, acceleration_offset=None)
         )
 
-    def started(self, problem: Problem, x: Array) -> Array:
+    def initial_accelerations(self, problem: Problem, x: Array) -> Array:
         """Accelerations (n,) at the start x: M a = -f on what is free.  Raises StudyError."""
         forces = Forces.of(problem, x, self.roles)
         free = self.comm.constraint_map(problem)
@@ -264,17 +268,19 @@ class Body:
 
     def masked(self, values: Affine) -> Affine:
         """Zero in unknowns without mass, for their velocities and accelerations."""
-        return Affine(values.c, np.where(self.heavy, values.constant, 0.0))
+        return Affine(values.c, np.where(self.has_mass, values.constant, 0.0))
 
 
 def _scaled(block: ElementBlock, factors: Array) -> ElementBlock:
     """A block whose equations have these factors, (n,)."""
     if (factors[block.dofs] == 1.0).all():
         return block
-    return replace(block, kernel=_Scaled(block.kernel), constant=False)
+    return replace(block, kernel=_ScaledKernel(block.kernel), constant=False)
 
 
-def _multipliers(system: System, problem: Problem, x: Array, heavy: Flags, roles: Roles) -> Flags:
+def _multipliers(
+    system: System, problem: Problem, x: Array, heavy: Flags, roles: EnergyRoles
+) -> Flags:
     """Unknowns (n,) of pages without mass that stand in no equation without mass, at x, (n,)."""
     massless = ~heavy
     massless[problem.fixed] = massless[roles.multipliers] = False
@@ -288,10 +294,10 @@ def _multipliers(system: System, problem: Problem, x: Array, heavy: Flags, roles
     return multipliers
 
 
-def _name_of(system: System, numbers: Flags) -> str:
+def _name_of(system: System, dofs: Flags) -> str:
     """Names of the unknowns among these, (n,)."""
     layout = system.numbering.layout
-    return join_names([repr(name) for name in layout.names if numbers[layout.part(name)].any()])
+    return join_names([repr(name) for name in layout.names if dofs[layout.part(name)].any()])
 
 
 def _averaged(block: ElementBlock, page: Block | None, multipliers: Flags) -> ElementBlock:

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from softehl.runtime.analyses.equations_of_motion import Body
+from softehl.runtime.analyses.equations_of_motion import EquationsOfMotion
 from softehl.runtime.analyses.motion import (
+    EnergyBalance,
     Forces,
-    Ledger,
     Motion,
     MotionState,
     parameter_work,
@@ -40,7 +40,7 @@ class ExplicitMarch:
     """
 
     dt: float
-    body: Body
+    body: EquationsOfMotion
     state: MotionState
     free: ConstraintMap
     masses: Array
@@ -48,20 +48,20 @@ class ExplicitMarch:
 
     @classmethod
     def of(
-        cls, integrator: CentralDifference, dt: float, body: Body, state: MotionState
+        cls, integrator: CentralDifference, dt: float, body: EquationsOfMotion, state: MotionState
     ) -> ExplicitMarch:
         """From a state with velocities.  Raises StudyError where an unknown needs a mass."""
         problem = body.at_end(state.ended_step(dt), state.v)
         _require_lumped_masses(body, problem)
         free = body.comm.constraint_map(problem)
-        march = cls(dt, body, state, free, free.gather(body.lumps), integrator)
+        march = cls(dt, body, state, free, free.gather(body.lumped_masses), integrator)
         a = march._accelerations(Forces.of(problem, state.x, body.roles).total)
         march.state = replace(state, a=a)
         return march
 
     def run(self, until: float) -> Iterator[Motion]:
         """Results every dt until the end.  Raises StudyError, NotConverged."""
-        ledger = Ledger(self.body.comm)
+        ledger = EnergyBalance(self.body.comm)
         begin = self.body.at_end(self.state.ended_step(self.dt), self.state.v)
         self._energies(begin, ledger)
         end, stable = begin, self._stable(begin)
@@ -75,7 +75,7 @@ class ExplicitMarch:
             stable = self._stable(end)
             yield self._motion(end, ledger, steps, stable)
 
-    def _step(self, initial_equations: Problem, t: float, ledger: Ledger) -> Problem:
+    def _step(self, initial_equations: Problem, t: float, ledger: EnergyBalance) -> Problem:
         """Velocity Verlet: the equations at the end of a step."""
         initial, body = self.state, self.body
         dt = t - initial.t
@@ -91,16 +91,16 @@ class ExplicitMarch:
             state = Solution(initial.x, Status.NOT_FINITE, message, (), 0, 0)
             raise NotConverged(Branch((Point(initial.t, state),), Status.NOT_FINITE, message))
         a = self._accelerations(forces.total)
-        moved = x - initial.x
+        displacement = x - initial.x
         old = Forces.of(initial_equations, initial.x, body.roles)
         supports = np.zeros(len(x))
         total = 0.5 * (old.total + forces.total)
-        inertia = self.body.lumps * (half - initial.v) / dt
+        inertia = self.body.lumped_masses * (half - initial.v) / dt
         supports[end.fixed] = (total + inertia)[end.fixed]
-        ledger.add(old.mean(forces), supports, moved)
+        ledger.add(old.mean(forces), supports, displacement)
         ledger.external += parameter_work(initial_equations, end, body.roles, (initial.x, x), None)
         v = self.integrator.half_step(dt, half, a)
-        histories = body.plain.committed(end, x, initial.histories)
+        histories = body.static_system.committed(end, x, initial.histories)
         self.state = MotionState(t, x, v, a, histories)
         return end
 
@@ -125,14 +125,14 @@ class ExplicitMarch:
             else self.dt / SAFE
         )
 
-    def _energies(self, end: Problem, ledger: Ledger) -> dict[str, float]:
-        kinetic = 0.5 * float(self.body.lumps @ self.state.v**2)
+    def _energies(self, end: Problem, ledger: EnergyBalance) -> dict[str, float]:
+        kinetic = 0.5 * float(self.body.lumped_masses @ self.state.v**2)
         stored = stored_energy(end, self.state.x, self.body.roles)
         forces = Forces.of(end, self.state.x, self.body.roles)
         return ledger.balance(self.state.t, kinetic, stored, forces, self.state.x)
 
-    def _motion(self, end: Problem, ledger: Ledger, steps: int, stable: float) -> Motion:
-        state, size = self.state, float(np.ptp(self.body.plain.mesh.points, axis=0).max())
+    def _motion(self, end: Problem, ledger: EnergyBalance, steps: int, stable: float) -> Motion:
+        state, size = self.state, float(np.ptp(self.body.static_system.mesh.points, axis=0).max())
         for block in end.assembler.blocks:
             if isinstance(block.kernel, Tie):
                 r = block.residual(state.x, end.parameters[block.name])[:, 2]
@@ -145,24 +145,24 @@ class ExplicitMarch:
         solution = Solution(state.x, Status.CONVERGED, f"{steps} steps", (), 0, 0)
         distributed = self.body.comm.distribute(end)
         return Motion(
-            *(self.body.plain, distributed, Point(state.t, solution), state.histories),
+            *(self.body.static_system, distributed, Point(state.t, solution), state.histories),
             v=state.v, a=state.a, energy=self._energies(end, ledger), stable_step=stable,
         )  # fmt: skip
 
 
-def _require_lumped_masses(body: Body, problem: Problem) -> None:
+def _require_lumped_masses(body: EquationsOfMotion, problem: Problem) -> None:
     """Raise StudyError where an unknown has no mass that needs one."""
-    system, comm = body.plain, body.comm
-    without = comm.sum_shared(body.lumps) <= 0.0
+    system, comm = body.static_system, body.comm
+    without = comm.sum_shared(body.lumped_masses) <= 0.0
     for block in problem.assembler.blocks:
         if isinstance(block.kernel, Tie):
             without[block.dofs[:, 2]] = False
     layout = system.numbering.layout
-    touches = [] if system.statement is None else system.statement.contacts
+    touches = [] if system.definition is None else system.definition.contacts
     internal = {n for b in system.blocks.values() for n in getattr(b.kernel, "internal", ())}
     for name in layout.names:
         if comm.max(float(without[layout.part(name)].any())):
-            if any(name == touch.unknown(m) for touch in touches for m in ("lambda", "tau")):
+            if any(name == request.unknown(m) for request in touches for m in ("lambda", "tau")):
                 raise StudyError(
                     'method = "explicit" takes no contact: take "generalised-alpha", which damps '
                     'what impacts leave, or "newmark" or "midpoint"'

@@ -148,14 +148,14 @@ class Cell:
         initial = np.eye(dim) if start is None else start.F
         after = np.where(free, initial, target)
         x0 = self.system.at_rest() if start is None else start.result.x
-        path = _Path(self, free, initial, after, x0, self._histories(start))
+        path = _CellPath(self, free, initial, after, x0, self._histories(start))
         first = 1.0 / count
         follow = Continuation(
             newton or Newton(linear=direct_solver("auto")),
             StepRule(first, min(SMALLEST, first), first),
             name="share of the load",
         ).follow
-        branch = follow(path.problem_at, 0.0, 1.0, path.z, on_point=path.keep)
+        branch = follow(path.problem_at, 0.0, 1.0, path.z, on_point=path.commit)
         if not branch.converged:
             raise NotConverged(branch, path.reached)
         assert path.reached is not None
@@ -178,7 +178,7 @@ class Cell:
 
 
 @dataclass(eq=False)
-class _Path:
+class _CellPath:
     """A cell on its way from one gradient to another."""
 
     cell: Cell
@@ -191,7 +191,7 @@ class _Path:
     z: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        basis, w = self.cell.fluctuations, self.x - self._moved(self.initial)
+        basis, w = self.cell.fluctuations, self.x - self._displacement(self.initial)
         counts: Array = np.asarray(basis.sum(axis=0)).ravel()
         opened = (self.initial - self._unit)[self.free]
         self.z = np.concatenate([np.asarray(basis.T @ w) / counts, opened])
@@ -200,10 +200,10 @@ class _Path:
     def _unit(self) -> Array:
         return np.eye(len(self.initial))
 
-    def _moved(self, F: Array) -> Array:
+    def _displacement(self, F: Array) -> Array:
         return np.asarray(self.cell.modes @ (F - self._unit).ravel())
 
-    def problem_at(self, t: float) -> Reduced:
+    def problem_at(self, t: float) -> PeriodicProblem:
         """The equations at a share of the way."""
         F = self.initial + t * (self.after - self.initial)
         F[self.free] = self._unit[self.free]
@@ -211,9 +211,9 @@ class _Path:
         problem = system.problem(system.quasi_static_step(t, self.x, self.histories))
         opened = csc_array(cell.modes[:, self.free.ravel()])
         basis = csc_array(hstack([cell.fluctuations, opened]))
-        return Reduced(problem, basis, self._moved(F), F)
+        return PeriodicProblem(problem, basis, self._displacement(F), F)
 
-    def keep(self, point: Point) -> None:
+    def commit(self, point: Point) -> None:
         """Go on from a converged point."""
         reduced, z = self.problem_at(point.parameter), point.solution.x
         F, x = reduced.shift.copy(), reduced.full(z)
@@ -230,10 +230,10 @@ class _Path:
         r, sizes = problem.assembler.residual_and_size(x, problem.parameters)
         nodal = self.cell.system.numbering.nodal
         for axis in _AXES[: len(self.initial)]:
-            numbers = nodal[f"u_{axis}"]
-            numbers = numbers[numbers >= 0]
-            net = float(r[numbers].sum())
-            if abs(net) > _NET * float(sizes[numbers].sum()):
+            dofs = nodal[f"u_{axis}"]
+            dofs = dofs[dofs >= 0]
+            net = float(r[dofs].sum())
+            if abs(net) > _NET * float(sizes[dofs].sum()):
                 raise StudyError(
                     f"periodic: a net force of {-net:.4g} along {axis} acts on the cell; loads, "
                     "body forces and springs of a periodic cell must balance"
@@ -241,7 +241,7 @@ class _Path:
 
 
 @dataclass(frozen=True, eq=False)
-class Reduced:
+class PeriodicProblem:
     """Equations B' R(B z + c) = 0, as Newton's method sees them.
 
     basis, base: B (n, m) and c (n,). shift: the gradient (dim, dim) that c stands for.
@@ -352,13 +352,13 @@ def _images(
 def _fluctuations(system: System, images: Integers, names: Sequence[str]) -> csc_array[np.float64]:
     """Unknowns by free ones, (n, m): images share one; the first node with displacements rests."""
     column = np.arange(system.size)
-    for numbers in system.numbering.nodal.values():
-        mask = numbers >= 0
+    for dofs in system.numbering.nodal.values():
+        mask = dofs >= 0
         first = np.full(len(images), system.size)
-        np.minimum.at(first, images[mask], numbers[mask])
-        column[numbers[mask]] = first[images[mask]]
+        np.minimum.at(first, images[mask], dofs[mask])
+        column[dofs[mask]] = first[images[mask]]
     starts = [system.numbering.nodal[name] for name in names]
-    fixed = [int(column[numbers[numbers >= 0][0]]) for numbers in starts]
+    fixed = [int(column[dofs[dofs >= 0][0]]) for dofs in starts]
     moving = ~np.isin(column, fixed)
     used, position = np.unique(column[moving], return_inverse=True)
     entries = np.ones(len(position)), (np.flatnonzero(moving), position)
@@ -370,7 +370,7 @@ def _modes(system: System, names: Sequence[str]) -> Array:
     dim = len(names)
     modes = np.zeros((system.size, dim * dim))
     for i, name in enumerate(names):
-        numbers = system.numbering.nodal[name]
-        mask = numbers >= 0
-        modes[numbers[mask], i * dim : (i + 1) * dim] = system.mesh.points[mask, :dim]
+        dofs = system.numbering.nodal[name]
+        mask = dofs >= 0
+        modes[dofs[mask], i * dim : (i + 1) * dim] = system.mesh.points[mask, :dim]
     return modes

@@ -64,11 +64,11 @@ def _same(a: Mesh, b: Mesh) -> bool:
 def _take_nodal(target: System, source: System, x: Array, values: Array) -> None:
     """Put values of the result at the nodes into x.  Raises StudyError where there are none."""
     nowhere = np.full(len(target.mesh.points), -1)
-    for name, numbers in target.numbering.nodal.items():
+    for name, dofs in target.numbering.nodal.items():
         old = source.numbering.nodal.get(name, nowhere)
-        defined = numbers >= 0
+        defined = dofs >= 0
         common = defined & (old >= 0)
-        x[numbers[common]] = values[old[common]]
+        x[dofs[common]] = values[old[common]]
         unsaid = defined & ~common & np.isnan(target.start.get(name, np.full(len(defined), np.nan)))
         if unsaid.any():
             node = int(unsaid.argmax())
@@ -83,13 +83,13 @@ def _take_others(target: System, source: System, x: Array, values: Array) -> Non
     named = set(target.numbering.nodal)
     for name, block in target.blocks.items():
         without_node = [(k, slot) for k, slot in enumerate(block.slots) if slot.node is None]
-        named |= {slot.name for _, slot in without_node} | block.form.dof_tables.keys()
+        named |= {slot.name for _, slot in without_node} | block.options.dof_tables.keys()
         old = source.blocks.get(name)
-        if not (without_node or block.form.along) or old is None:
+        if not (without_node or block.options.along) or old is None:
             continue
         _require_elements(block, old)
-        for along, points in block.form.dof_tables.items():
-            if np.array_equal(points, old.form.dof_tables.get(along, ())):
+        for along, points in block.options.dof_tables.items():
+            if np.array_equal(points, old.options.dof_tables.get(along, ())):
                 target_rows, source_rows = (s.numbering.rows(name, along) for s in (target, source))
                 x[target_rows] = values[source_rows]
         for k, slot in without_node:

@@ -135,7 +135,7 @@ it has none, only the work of its forces counts.
 
 
 @dataclass(frozen=True, eq=False)
-class Roles:
+class EnergyRoles:
     """Roles of the blocks of a system in the account of energies.
 
     of: block -> its role. multipliers: numbers of the unknowns of ties and contacts. bound: of the
@@ -147,7 +147,7 @@ class Roles:
     bound: Integers
 
     @classmethod
-    def in_system(cls, system: System) -> Roles:
+    def in_system(cls, system: System) -> EnergyRoles:
         """Of the equations without inertia."""
         names = contact_blocks(system)
         roles: dict[str, Role] = {}
@@ -186,7 +186,7 @@ class Forces:
     contact: Array
 
     @classmethod
-    def of(cls, problem: Problem, x: Array, roles: Roles) -> Forces:
+    def of(cls, problem: Problem, x: Array, roles: EnergyRoles) -> Forces:
         """Without inertia given by densities; ties and contacts without their own equations."""
         problem = problem.at(x)
         size = problem.assembler.size
@@ -226,7 +226,7 @@ def has_energy(kernel: object) -> bool:
     return "energy" in kernel.tasks and not timed and not kernel.history
 
 
-def stored_energy(problem: Problem, x: Array, roles: Roles | None = None) -> float:
+def stored_energy(problem: Problem, x: Array, roles: EnergyRoles | None = None) -> float:
     """Energies of springs and pages of this process at unknowns x, (n,)."""
     energy = 0.0
     for block in problem.assembler.blocks:
@@ -246,7 +246,11 @@ def _energy(block: ElementBlock, x: Array, parameters: Array) -> float:
 
 
 def parameter_work(
-    initial: Problem, end: Problem, roles: Roles, xs: tuple[Array, Array], middle: Problem | None
+    initial: Problem,
+    end: Problem,
+    roles: EnergyRoles,
+    xs: tuple[Array, Array],
+    middle: Problem | None,
 ) -> float:
     """Work of parameters that changed in a step: on unknowns xs, those of its ends.
 
@@ -274,7 +278,7 @@ class EnergyGain(RuntimeWarning):
 
 
 @dataclass
-class Ledger:
+class EnergyBalance:
     """Energies of a march: work of loads and of forces without an energy, since the beginning.
 
     comm: of the processes, of which each knows the work of its elements. largest: sum of the
@@ -290,13 +294,13 @@ class Ledger:
     latest: list[float] = field(default_factory=list)
     warned: bool = False
 
-    def add(self, forces: Forces, supports: Array, moved: Array) -> None:
+    def add(self, forces: Forces, supports: Array, displacement: Array) -> None:
         """Work of forces, mean of a step, and of supports (n,), as the unknowns moved (n,).
 
         Ties work where their offset moves. Frictionless contact does no work.
         """
-        self.external += float((supports - forces.loads - forces.ties) @ moved)
-        self.others += float(forces.others @ moved)
+        self.external += float((supports - forces.loads - forces.ties) @ displacement)
+        self.others += float(forces.others @ displacement)
 
     def balance(
         self, t: float, kinetic: float, stored: float, forces: Forces, x: Array

@@ -325,10 +325,10 @@ class _TimeStepper(Stepper):
 
 def _constraint_forces(system: System) -> set[str]:
     """Names of the unknowns of contacts and ties."""
-    if system.statement is None:
+    if system.definition is None:
         return set()
-    names = {f.label for f in system.statement.forces if isinstance(f.kernel, Tie)}
-    for contact in system.statement.contacts:
+    names = {f.label for f in system.definition.forces if isinstance(f.kernel, Tie)}
+    for contact in system.definition.contacts:
         names.update(map(contact.unknown, MULTIPLIERS[system.mesh.dimension]))
     return names
 

@@ -11,7 +11,7 @@ from softehl.runtime.definition.argument_checks import finite
 from softehl.runtime.definition.element_blocks import page_on
 from softehl.runtime.definition.problem_definition import (
     Block,
-    Form,
+    PageOptions,
     ProblemDefinition,
     StudyError,
     display_name,
@@ -28,19 +28,19 @@ KINDS = {2: ("line2", "line3"), 3: ("tri3", "quad4", "tri6", "quad8", "quad9")}
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class ContactRequest:
     """Request of a contact.
 
-    labels: of the blocks of its sides, one for each kind. others: kind -> faces that it may meet.
-    names: of the displacements. alone: both are one surface. stiffness, depth: None: derived.
+    labels: of the blocks of its sides, one for each kind. other_faces: kind -> faces that it may
+    meet. names: of the displacements. alone: both are one surface. stiffness, depth: None: derived.
     """
 
     name: str
     labels: tuple[str, ...]
-    others: tuple[tuple[str, Integers], ...]
+    other_faces: tuple[tuple[str, Integers], ...]
     names: tuple[str, ...]
     friction: float
-    ring: bool
+    axisymmetric: bool
     alone: bool
     stiffness: float | None
     depth: float | None
@@ -75,9 +75,9 @@ def _contact_and_sides(
     sides: tuple[str | Predicate, str | Predicate | None],
     of: Sequence[str] | None,
     coefficients: Mapping[str, float | None],
-) -> tuple[Touch, dict[str, Block]]:
+) -> tuple[ContactRequest, dict[str, Block]]:
     """A contact and the blocks of its sides.  Raises StudyError, MeshError."""
-    mesh, ring = definition.mesh, definition.ring
+    mesh, axisymmetric = definition.mesh, definition.axisymmetric
     context = f"contact({', '.join(display_name(s) for s in sides if s is not None)})"
     mesh.require_whole(context)
     if mesh.dimension not in KINDS:
@@ -107,11 +107,11 @@ def _contact_and_sides(
     blocks = {}
     for kind, faces in side_faces.items():
         label = name if len(side_faces) == 1 else f"{name}:{kind}"
-        blocks[label] = _block(mesh, name, label, (kind, faces), names, float(ring))
+        blocks[label] = _block(mesh, name, label, (kind, faces), names, float(axisymmetric))
     friction, stiffness, depth = (numbers[k] for k in ("friction", "stiffness", "depth"))
     faces_of = (*other_faces.items(),)
-    contact = Touch(
-        name, (*blocks,), faces_of, names, friction or 0.0, ring, alone, stiffness, depth
+    contact = ContactRequest(
+        name, (*blocks,), faces_of, names, friction or 0.0, axisymmetric, alone, stiffness, depth
     )
     return contact, blocks
 
@@ -129,11 +129,11 @@ def _block(
     label: str,
     elements: tuple[str, Integers],
     names: tuple[str, ...],
-    ring: float,
+    axisymmetric: float,
 ) -> Block:
     family = "mortar" if mesh.dimension == 2 else "touch"
     kernel = load_kernel(f"{family}_side_{len(CELLS[elements[0]].nodes)}")
-    side_data = {"rho": 1.0, "ring": ring} if mesh.dimension == 2 else {"rho": 1.0}
+    side_data = {"rho": 1.0, "ring": axisymmetric} if mesh.dimension == 2 else {"rho": 1.0}
     study_names = {f"u_{axis}": name for axis, name in zip("xyz", names, strict=False)}
     study_names |= {m: f"{name}:{m}" for m in MULTIPLIERS[mesh.dimension]}
-    return page_on(mesh, label, kernel, elements, Form(called=study_names), side_data)
+    return page_on(mesh, label, kernel, elements, PageOptions(called=study_names), side_data)

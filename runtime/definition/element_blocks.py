@@ -10,9 +10,14 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.argument_checks import datum, parameter, require_names
-from softehl.runtime.definition.kernel_loading import Origin
+from softehl.runtime.definition.kernel_loading import KernelOrigin
 from softehl.runtime.definition.line_fields import interpolated, placed, require_apart
-from softehl.runtime.definition.problem_definition import Block, Form, ProblemDefinition, StudyError
+from softehl.runtime.definition.problem_definition import (
+    Block,
+    PageOptions,
+    ProblemDefinition,
+    StudyError,
+)
 from softehl.runtime.discretisation.dofmap import Slot, slots
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.kernels.kernel_call import Rule
@@ -116,7 +121,7 @@ def page_on(
     name: str,
     kernel: Kernel,
     elements: Elements,
-    form: Form,
+    form: PageOptions,
     arguments: Mapping[str, Any],
 ) -> Block:
     """A block of elements with everything its page needs.  Raises StudyError."""
@@ -164,7 +169,7 @@ def page_on(
         nodes=nodes,
         kind=kind,
         slots=study_slots,
-        form=form,
+        options=form,
         data=data,
         previous={d: s for d, s in previous.items() if d not in data},
         rates={d: s for d, s in rates.items() if d not in data},
@@ -273,7 +278,7 @@ def form_of(
     along: Mapping[str, int | Integers] | None,
     rule: object,
     constant: bool,
-) -> Form:
+) -> PageOptions:
     """The form of a page on the elements of block `name`.  Raises StudyError."""
     names = _mapping(name, "called", called, '{"u": "u_x"}')
     if not all(isinstance(name_in_study, str) for name_in_study in names.values()):
@@ -281,7 +286,7 @@ def form_of(
     fields = _mapping(name, "along", along, '{"p": 2}')
     orders = {n: int(g) if isinstance(g, np.integer) else g for n, g in fields.items()}
     one = (shared,) if isinstance(shared, str) else shared
-    return Form(frozenset(one), names, orders, _rule(name, rule), constant)
+    return PageOptions(frozenset(one), names, orders, _rule(name, rule), constant)
 
 
 def elements_on(name: str, on: Any) -> On:
@@ -319,8 +324,8 @@ def _rule(name: str, rule: Any) -> Rule | None:
 def add_block(
     definition: ProblemDefinition,
     name: str,
-    origin: Origin,
-    form: Form,
+    origin: KernelOrigin,
+    form: PageOptions,
     *,
     on: On,
     cells: str | None,
@@ -339,7 +344,7 @@ def add_block(
         blocks[label] = replace(block, differentiated=origin.differentiated(kernel))
 
 
-def _kernels(mesh: Mesh, origin: Origin, on: On, cells: str | None) -> list[Kernel]:
+def _kernels(mesh: Mesh, origin: KernelOrigin, on: On, cells: str | None) -> list[Kernel]:
     """Kernels of a page on the selected kinds of cells or faces."""
     kinds = kinds_of(mesh, on, cells)
     try:

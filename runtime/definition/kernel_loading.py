@@ -18,7 +18,7 @@ function decorated by `softehl.page`."""
 
 
 @dataclass(frozen=True)
-class Origin:
+class KernelOrigin:
     """Origin of kernels. model: one of several of a source. law: it is a stress law."""
 
     source: Any
@@ -29,7 +29,7 @@ class Origin:
     @classmethod
     def of(
         cls, block: str, source: Source, *, material: Source, model: str | None, geometry: str
-    ) -> Origin:
+    ) -> KernelOrigin:
         """Return the origin of a page or a stress law.  Raises StudyError unless one is given."""
         if (source is None) == (material is None):
             raise StudyError(f"{block!r}: give a page or material=..., one of them")
@@ -52,14 +52,14 @@ class Origin:
             return None
         if "pseudo_load" in kernel.tasks and not kernel.point_data:
             return None  # it comes with what is needed
-        return Derived(self, kernel)
+        return DerivativeKernel(self, kernel)
 
 
 @dataclass(frozen=True, eq=False)
-class Derived:
+class DerivativeKernel:
     """Maker of the kernel of derivatives of the page that a kernel was made of."""
 
-    origin: Origin | None
+    origin: KernelOrigin | None
     kernel: Kernel
 
     def __call__(self) -> Kernel:
@@ -89,7 +89,7 @@ class Derived:
             )
         return self._loaded(self.origin, derivatives=True)
 
-    def _loaded(self, origin: Origin, *, derivatives: bool = False) -> Kernel:
+    def _loaded(self, origin: KernelOrigin, *, derivatives: bool = False) -> Kernel:
         kernel = self.kernel
         return page_loader.load_page(
             origin.source,

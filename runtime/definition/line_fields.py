@@ -9,7 +9,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.definition.argument_checks import require_names
-from softehl.runtime.definition.problem_definition import Block, Form, StudyError
+from softehl.runtime.definition.problem_definition import Block, PageOptions, StudyError
 from softehl.runtime.discretisation.dofmap import Slot
 from softehl.runtime.discretisation.quadrature import (
     automatic_points,
@@ -23,8 +23,8 @@ from softehl.runtime.suggestions import join_names
 
 
 def placed(
-    block: str, kernel: Kernel, count: int, slots: Sequence[Slot], form: Form
-) -> tuple[tuple[Slot, ...], Form]:
+    block: str, kernel: Kernel, count: int, slots: Sequence[Slot], form: PageOptions
+) -> tuple[tuple[Slot, ...], PageOptions]:
     """Slots of unknowns at nodes and of elements, and the form with the places of all others.
 
     count: of the elements. An order stands for a polynomial by its values at the Gauss-Lobatto
@@ -95,7 +95,7 @@ def _by_order(name: str, order: int) -> tuple[Slot, ...]:
     return (Slot(name, 0), *inner, Slot(name, 1))
 
 
-def _orders(block: str, kernel: Kernel, form: Form) -> dict[str, int]:
+def _orders(block: str, kernel: Kernel, form: PageOptions) -> dict[str, int]:
     """Orders of the fields, as the page lists them; none where places are given.
 
     Raises StudyError.

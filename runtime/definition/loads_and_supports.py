@@ -9,11 +9,11 @@ import numpy as np
 from softehl.runtime.arrays import Integers
 from softehl.runtime.definition import argument_checks as read
 from softehl.runtime.definition.problem_definition import (
-    Condition,
     Datum,
-    Force,
+    InitialValues,
+    Load,
+    PrescribedValues,
     ProblemDefinition,
-    Start,
     StudyError,
     Where,
     display_name,
@@ -32,7 +32,7 @@ def add_load(definition: ProblemDefinition, where: Where, components: Mapping[st
         value = read.amount(context, name, component)
         if isinstance(where, str) or callable(where):
             for kind, faces in mesh.faces(where).items():
-                kernel = DeadLoad(CELLS[kind], value, definition.ring)
+                kernel = DeadLoad(CELLS[kind], value, definition.axisymmetric)
                 _add_force(definition, "load", where, kernel, faces, (name,))
         else:
             nodes = mesh.own(read.nodes_of(mesh, where))
@@ -53,7 +53,7 @@ def add_pressure(
             f"{mesh.dimension} coordinates is needed, in 2-D or 3-D"
         )
     for kind, faces in mesh.outer_faces(where).items():
-        kernel = Pressure(CELLS[kind], value, definition.ring)
+        kernel = Pressure(CELLS[kind], value, definition.axisymmetric)
         _add_force(definition, "pressure", where, kernel, faces, names)
 
 
@@ -78,7 +78,7 @@ def add_conditions(
     read.require_unknowns(context, values, "u_x=0")
     for name, prescribed in values.items():
         value = read.amount(context, name, prescribed)
-        condition = Condition(where, read.nodes_of(mesh, where), name, value)
+        condition = PrescribedValues(where, read.nodes_of(mesh, where), name, value)
         definition.conditions.append(condition)
 
 
@@ -128,7 +128,7 @@ def add_initial_values(
     nodes = everywhere if where is None else read.nodes_of(mesh, where)
     for name, value in values.items():
         at_nodes = read.datum("start", name, value, mesh.points[nodes])
-        definition.start.append(Start(name, nodes, at_nodes))
+        definition.start.append(InitialValues(name, nodes, at_nodes))
 
 
 def _add_force(
@@ -142,4 +142,4 @@ def _add_force(
     forces = definition.forces
     label = f"{what} {len(forces) + 1}: {what}({display_name(where)}, {', '.join(names)})"
     location = where if isinstance(where, str) else display_name(where)
-    forces.append(Force(label, kernel, nodes, names, what, location))
+    forces.append(Load(label, kernel, nodes, names, what, location))

@@ -29,7 +29,7 @@ class StudyError(SoftehlError, ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class PageOptions:
     """Form of a page on its elements: names, places, quadrature.
 
     shared: unknowns without a node that are one for all elements. called: name of an unknown on the
@@ -67,7 +67,7 @@ class Block:
     nodes: Integers
     kind: str
     slots: tuple[Slot, ...]
-    form: Form
+    options: PageOptions
     data: Mapping[str, Array]
     previous: Mapping[str, Slot]
     rates: Mapping[str, Slot]
@@ -79,7 +79,7 @@ class Block:
     @property
     def shared(self) -> frozenset[str]:
         """Unknowns without a node that are one for all elements."""
-        return self.form.shared
+        return self.options.shared
 
     @property
     def filled(self) -> dict[str, Slot]:
@@ -88,7 +88,7 @@ class Block:
 
 
 @dataclass(frozen=True, eq=False)
-class Condition:
+class PrescribedValues:
     """Prescribed values of an unknown at nodes."""
 
     where: Where
@@ -103,7 +103,7 @@ class Condition:
 
 
 @dataclass(frozen=True, eq=False)
-class Force:
+class Load:
     """A load, a pressure, a spring or a tie: elements of a kernel of ours on unknowns by name.
 
     what, where: the call and its place in words: "load", "right".
@@ -118,7 +118,7 @@ class Force:
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class InitialValues:
     """Values of an unknown at nodes at the start, (n,) each."""
 
     name: str
@@ -130,15 +130,15 @@ class Start:
 class ProblemDefinition:
     """A boundary-value problem that is being written down, in the order of the script.
 
-    ring: whether cells and sides are those of rings around the x axis.
+    axisymmetric: whether cells and sides are those of rings around the x axis.
     """
 
     mesh: Mesh
-    ring: bool = False
+    axisymmetric: bool = False
     blocks: dict[str, Block] = field(default_factory=dict)
-    conditions: list[Condition] = field(default_factory=list)
-    forces: list[Force] = field(default_factory=list)
-    start: list[Start] = field(default_factory=list)
+    conditions: list[PrescribedValues] = field(default_factory=list)
+    forces: list[Load] = field(default_factory=list)
+    start: list[InitialValues] = field(default_factory=list)
     contacts: list[Any] = field(default_factory=list)
 
     def copy(self) -> ProblemDefinition:
@@ -149,8 +149,8 @@ class ProblemDefinition:
         return replace(self, **containers)
 
     @property
-    def count(self) -> int:
-        """Number of statements; it only grows."""
+    def size(self) -> int:
+        """Number of blocks, supports, loads and initial values; it only grows."""
         return sum(map(len, (self.blocks, self.conditions, self.forces, self.start)))
 
     def prescribed(self, name: str) -> Integers:

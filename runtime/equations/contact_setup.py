@@ -12,7 +12,7 @@ from softehl.runtime.contact.body_thickness import inner_radii, thickness
 from softehl.runtime.contact.mortar_pair import MortarPairKernel
 from softehl.runtime.contact.search import Contact, ContactSide, StateDependentBlocks
 from softehl.runtime.contact.search_3d import FaceContact
-from softehl.runtime.definition.contact_sides import MULTIPLIERS, Touch
+from softehl.runtime.definition.contact_sides import MULTIPLIERS, ContactRequest
 from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.dofmap import Numbering
 from softehl.runtime.discretisation.element_blocks import ElementBlock
@@ -29,60 +29,62 @@ from 0.5 on, of quadratic faces from 0.25 on, sticking and slipping may cycle.""
 _NOTHING = 1e-9  # of the parent face, of order 1: exact shares are 0, or more than a tenth
 
 
-def contact_of(statement: ProblemDefinition, numbering: Numbering, touch: Touch) -> AnyContact:
+def contact_of(
+    definition: ProblemDefinition, numbering: Numbering, request: ContactRequest
+) -> AnyContact:
     """The search and the elements of a contact, whose stiffness is not known yet.
 
     Raises StudyError.
     """
-    mesh = statement.mesh
-    _require_displacements(statement, touch)
+    mesh = definition.mesh
+    _require_displacements(definition, request)
     sides = []
-    for label in touch.labels:
-        block = statement.blocks[label]
+    for label in request.labels:
+        block = definition.blocks[label]
         x = mesh.points[block.nodes]
         reach = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)  # of the order of a face
         body = mesh.points, mesh.boundary, block.nodes
-        depth = inner_radii(*body) if touch.alone else thickness(*body)
+        depth = inner_radii(*body) if request.alone else thickness(*body)
         depth = np.minimum(depth, float(np.ptp(mesh.points, axis=0).max()))
-        if touch.depth is not None:
-            depth = np.full(len(reach), touch.depth)
+        if request.depth is not None:
+            depth = np.full(len(reach), request.depth)
         sides.append(ContactSide(block.kind, block.nodes, np.ones(len(reach)), depth, reach))
-    kinds = [(s.kind, other) for s in sides for other, _ in touch.others]
-    unknowns = [touch.unknown(m) for m in MULTIPLIERS[mesh.dimension]]
+    kinds = [(s.kind, other) for s in sides for other, _ in request.other_faces]
+    unknowns = [request.unknown(m) for m in MULTIPLIERS[mesh.dimension]]
     arguments = (
-        touch.name,
+        request.name,
         mesh.points,
-        np.stack([numbering.nodal[n] for n in touch.names], axis=1),
+        np.stack([numbering.nodal[n] for n in request.names], axis=1),
         np.stack([numbering.nodal[n] for n in unknowns], axis=1),
         tuple(sides),
-        touch.others,
+        request.other_faces,
     )
     if mesh.dimension == 3:
         law = load_kernel("touch")
         pairs = {(a, b): MortarPairKernel(law, CELLS[a], CELLS[b]) for a, b in kinds}
-        return FaceContact(*arguments, pairs, touch.friction, touch.alone)
+        return FaceContact(*arguments, pairs, request.friction, request.alone)
     nodes = {kind: len(CELLS[kind].nodes) for pair in kinds for kind in pair}
     kernels = {(a, b): load_kernel(f"mortar_{nodes[a]}{nodes[b]}") for a, b in kinds}
-    return Contact(*arguments, kernels, touch.friction, touch.ring, touch.alone)
+    return Contact(*arguments, kernels, request.friction, request.axisymmetric, request.alone)
 
 
-def _require_displacements(statement: ProblemDefinition, touch: Touch) -> None:
+def _require_displacements(definition: ProblemDefinition, request: ContactRequest) -> None:
     """Raise StudyError for displacements that no page of a body has."""
-    contacts = {label for other in statement.contacts for label in other.labels}
-    bodies = [block for label, block in statement.blocks.items() if label not in contacts]
+    contacts = {label for other in definition.contacts for label in other.labels}
+    bodies = [block for label, block in definition.blocks.items() if label not in contacts]
     existing = list(dict.fromkeys(s.name for b in bodies for s in b.slots if s.node is not None))
-    for name in touch.names:
+    for name in request.names:
         if name not in existing:
             raise StudyError(
-                f"{touch.name!r}: no unknown {name!r}{did_you_mean(name, existing)}; at nodes: "
+                f"{request.name!r}: no unknown {name!r}{did_you_mean(name, existing)}; at nodes: "
                 f"{join_names(existing)}; give of=(...), the displacements along x and y"
             )
 
 
 def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
     """The system with its contacts, of the stiffness of the bodies at rest.  Raises StudyError."""
-    statement = system.statement
-    assert statement is not None
+    definition = system.definition
+    assert definition is not None
     if not contacts:
         return system
     x = system.at_rest()
@@ -91,10 +93,10 @@ def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
     with np.errstate(all="ignore"):
         stiffness = problem.assembler.linearise(x, problem.parameters)[1].diagonal()
     assembler, blocks, contacts_with_stiffness = system.assembler, dict(system.blocks), []
-    for touch in statement.contacts:
-        contact = contacts[touch.name]
-        rho = [_rho(system, touch, contact, side, stiffness) for side in contact.sides]
-        for label, values in zip(touch.labels, rho, strict=True):
+    for request in definition.contacts:
+        contact = contacts[request.name]
+        rho = [_rho(system, request, contact, side, stiffness) for side in contact.sides]
+        for label, values in zip(request.labels, rho, strict=True):
             data = {**blocks[label].data, "rho": values}
             blocks[label] = replace(blocks[label], data=data)
             columns = [data[name] for name in blocks[label].kernel.data]
@@ -108,8 +110,8 @@ def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
 
 def contact_blocks(system: System) -> dict[str, float]:
     """Friction of each block of a contact, by name: those of its sides and of its pairs."""
-    touches = [] if system.statement is None else system.statement.contacts
-    friction = {label: touch.friction for touch in touches for label in touch.labels}
+    touches = [] if system.definition is None else system.definition.contacts
+    friction = {label: request.friction for request in touches for label in request.labels}
     pairs = {b.name: c.friction for c in system.contacts for b in c.empty()}
     return {**friction, **pairs}
 
@@ -125,8 +127,8 @@ def weighted(
     for contact in system.contacts:
         sides = tuple(replace(side, rho=weight * side.rho) for side in contact.sides)
         contacts.append(replace(contact, sides=sides))  # type: ignore[type-var]
-    labels = [] if system.statement is None else system.statement.contacts
-    for label in (label for touch in labels for label in touch.labels):
+    labels = [] if system.definition is None else system.definition.contacts
+    for label in (label for request in labels for label in request.labels):
         block = system.assembler.block(label)
         assert block.data is not None
         data = block.data.copy()
@@ -135,10 +137,12 @@ def weighted(
     return tuple(contacts), blocks
 
 
-def _rho(system: System, touch: Touch, contact: AnyContact, side: ContactSide, K: Array) -> Array:
+def _rho(
+    system: System, request: ContactRequest, contact: AnyContact, side: ContactSide, K: Array
+) -> Array:
     """Stiffness per area, (n,), about that of the softer of the two bodies beneath a side."""
-    if touch.stiffness is not None:
-        return np.full(len(side.faces), touch.stiffness)
+    if request.stiffness is not None:
+        return np.full(len(side.faces), request.stiffness)
     at_nodes = _per_area(contact, [(side.kind, side.faces)], K)[side.faces]
     side_stiffness = at_nodes[:, _loaded(CELLS[side.kind])].mean(axis=1)
     other_stiffness = _per_area(contact, contact.others, K)
@@ -150,7 +154,7 @@ def _rho(system: System, touch: Touch, contact: AnyContact, side: ContactSide, K
     )
     if not (np.isfinite(rho) & (rho > 0.0)).all():
         raise StudyError(
-            f"{touch.name!r}: the bodies have no stiffness at rest; give stiffness=..., about "
+            f"{request.name!r}: the bodies have no stiffness at rest; give stiffness=..., about "
             "Young's modulus over the length of a side"
         )
     curved = isinstance(contact, FaceContact) and CELLS[side.kind].order > 1
@@ -161,12 +165,12 @@ def _per_area(contact: AnyContact, faces: object, K: Array) -> Array:
     """Entries of the diagonal of K over the area of each node, (points,); zero elsewhere."""
     area = np.zeros(len(contact.points))
     for kind, nodes in faces:  # type: ignore[attr-defined]
-        ring = isinstance(contact, Contact) and contact.ring
-        at, weights = CELLS[kind].measured_rule(CELLS[kind].order, ring=ring)
+        axisymmetric = isinstance(contact, Contact) and contact.ring
+        at, weights = CELLS[kind].measured_rule(CELLS[kind].order, ring=axisymmetric)
         points = contact.points[nodes]
         density = measures(CELLS[kind], points, at)
         shape = CELLS[kind].shape(at)
-        if ring:
+        if axisymmetric:
             density = density * 2.0 * np.pi * np.einsum("qk,nk->nq", shape, points[:, :, 1])
         fractions = np.einsum("nq,q,qk->nk", density, weights, shape)
         first = _loaded(CELLS[kind]).start

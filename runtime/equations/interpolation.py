@@ -64,7 +64,7 @@ class Interpolation:
         return None
 
 
-def interpolation(system: System, points: Array, group: str | None = None) -> Interpolation:
+def interpolate_unknowns(system: System, points: Array, group: str | None = None) -> Interpolation:
     """Unknowns at places (n, dim), in the cells, of a group, that hold them."""
     located = system.mesh.holding(points, group)
     entries: dict[str, list[tuple[Integers, Integers, Array]]] = {}
@@ -111,7 +111,7 @@ def interpolation_weights(system: System, point: Array) -> dict[str, tuple[Integ
 
     Without unknowns that this cell does not have; None where no cell is there.
     """
-    interpolated = interpolation(system, np.asarray(point)[None])
+    interpolated = interpolate_unknowns(system, np.asarray(point)[None])
     if not len(interpolated.located.point):
         return None
     in_first_cell = {
@@ -152,8 +152,8 @@ def at_every_node(system: System, x: Array) -> dict[str, Array]:
     stands; nan where there is none.
     """
     nodal_values = {}
-    for name, numbers in system.numbering.nodal.items():
-        values = nodal_values[name] = np.where(numbers >= 0, x[numbers], np.nan)
+    for name, dofs in system.numbering.nodal.items():
+        values = nodal_values[name] = np.where(dofs >= 0, x[dofs], np.nan)
         for block in _at_corners(system, name):
             linear = _linear(block.kind)
             corners = linear.shape[1]

@@ -75,10 +75,10 @@ def _elements(system: System, block: Block, values: Mapping[str, Any]) -> Elemen
     density = system.comm.restrict_cells(block.name, every)
     if (every < 0.0).any():
         raise StudyError(f"mass of {block.name!r}: rho = {every.min():g}, it cannot be negative")
-    ring = system.statement is not None and system.statement.ring
+    axisymmetric = system.definition is not None and system.definition.axisymmetric
     cell, geometry = interpolation(block.kind, count), CELLS[block.kind]
     every_place = system.mesh.points[block.nodes[:, : len(geometry.nodes)]]
-    matrices = mass_matrices(cell, every_place, density, ring=ring, geometry=geometry)
+    matrices = mass_matrices(cell, every_place, density, ring=axisymmetric, geometry=geometry)
     dofs = np.concatenate([system.numbering.nodal[name][nodes] for name in names], axis=1)
     kernel = MassKernel(matrices, len(names))
     return ElementBlock(

@@ -64,7 +64,9 @@ def require_supported(system: System, problem: Any, x: Array) -> None:
         shape = len(free), len(system.numbering.nodal), system.mesh.dimension + 1
         unit = np.ones(shape[1])
         unit[name[members]] = units[members]
-        motions = _Motions(system, free.reshape(shape), unit, centres[part], sizes[part]).names()
+        motions = _RigidBodyModes(
+            system, free.reshape(shape), unit, centres[part], sizes[part]
+        ).names()
         first = int(node[members[node[members] >= 0]].min())
         alone = (parts[node >= 0] == part).all()
         raise NotConverged(_unsupported(system, x, motions, first, alone=bool(alone)))
@@ -81,9 +83,9 @@ def _unsupported(system: System, x: Array, motions: str, node: int, *, alone: bo
 def _nodal(system: System) -> tuple[Integers, Integers]:
     """Node and number of the name of each unknown, (n,), -1 where it is at no node."""
     node, name = np.full(system.size, -1), np.full(system.size, -1)
-    for k, numbers in enumerate(system.numbering.nodal.values()):
-        nodes = np.flatnonzero(numbers >= 0)
-        node[numbers[nodes]], name[numbers[nodes]] = nodes, k
+    for k, dofs in enumerate(system.numbering.nodal.values()):
+        nodes = np.flatnonzero(dofs >= 0)
+        node[dofs[nodes]], name[dofs[nodes]] = nodes, k
     return node, name
 
 
@@ -161,7 +163,7 @@ def _null(rows: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Motions:
+class _RigidBodyModes:
     """Free motions (k, names, 1 + dim) of a part: constants, and slopes by (x - centre) / size, in
     units (names,).
     """

@@ -12,9 +12,9 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.contact.search import ContactProblem, StateDependentBlocks
 from softehl.runtime.definition.problem_definition import (
     Block,
-    Condition,
-    Force,
+    Load,
     Number,
+    PrescribedValues,
     ProblemDefinition,
     StudyError,
 )
@@ -76,9 +76,9 @@ class System:
         Distribution of the unknowns over processes.
     whole : System, optional
         The equations of all processes, of a distributed system.
-    statement : object
+    definition : object
         Definition of the study.
-    written : int
+    definition_size : int
         Size of the definition when the equations were made.
     contacts : tuple
         Contacts, whose elements are found at each iterate.
@@ -88,13 +88,13 @@ class System:
     numbering: Numbering
     assembler: Assembler
     blocks: Mapping[str, Block]
-    conditions: tuple[Condition, ...]
-    implied: tuple[Force, ...] = ()
+    conditions: tuple[PrescribedValues, ...]
+    implied: tuple[Load, ...] = ()
     start: Mapping[str, Array] = field(default_factory=dict)
     comm: Communicator = SERIAL
     whole: System | None = None
-    statement: ProblemDefinition | None = field(default=None, repr=False)
-    written: int = 0
+    definition: ProblemDefinition | None = field(default=None, repr=False)
+    definition_size: int = 0
     contacts: tuple[StateDependentBlocks, ...] = ()
 
     def __repr__(self) -> str:
@@ -122,9 +122,9 @@ class System:
         """
         x = np.zeros(self.size)
         for name, values in self.start.items():
-            numbers = self.numbering.nodal[name]
-            specified = (numbers >= 0) & ~np.isnan(values)
-            x[numbers[specified]] = values[specified]
+            dofs = self.numbering.nodal[name]
+            specified = (dofs >= 0) & ~np.isnan(values)
+            x[dofs[specified]] = values[specified]
         return x
 
     def histories(self) -> dict[str, Array]:
@@ -246,7 +246,7 @@ class System:
         StudyError
             As of `problem`.
         """
-        if self.statement is not None and self.statement.count != self.written:
+        if self.definition is not None and self.definition.size != self.definition_size:
             raise StudyError(
                 "the study was changed on its way, which this path does not see: end the loop and "
                 "go on from its last result, study.march(start=result, ...) or solve(start=result)"
@@ -299,15 +299,15 @@ class System:
             columns.append(source[self.numbering.nodal[slot.name][page.nodes[:, slot.node or 0]]])
         return np.stack(columns, axis=1) if columns else None
 
-    def _require_tied(self, tie: Force, step: Step, values: Mapping[int, float]) -> None:
+    def _require_tied(self, tie: Load, step: Step, values: Mapping[int, float]) -> None:
         """Raise StudyError where values that are prescribed on both sides break a tie."""
         assert isinstance(tie.kernel, Tie)
         points = self.mesh.points[tie.nodes[:, 0]]
         offsets = amount(tie.kernel.offset, points, step.t, step.factor)
-        numbers = self.numbering.nodal[tie.names[0]][tie.nodes]
-        sizes = [abs(values[int(number)]) for number in numbers.ravel()]
+        dofs = self.numbering.nodal[tie.names[0]][tie.nodes]
+        sizes = [abs(values[int(number)]) for number in dofs.ravel()]
         size = max([*sizes, *np.abs(offsets)], default=0.0)
-        for (a, b), offset, node in zip(numbers, offsets, tie.nodes[:, 0], strict=True):
+        for (a, b), offset, node in zip(dofs, offsets, tie.nodes[:, 0], strict=True):
             difference = values[int(a)] - values[int(b)] - float(offset)
             if abs(difference) > _SAME * size:
                 raise StudyError(
@@ -320,25 +320,25 @@ class System:
         prescribed = np.full(self.size, np.nan)
         by = np.full(self.size, -1)
         for k, condition in enumerate(self.conditions):
-            numbers = self.numbering.nodal[condition.name][condition.nodes]
+            dofs = self.numbering.nodal[condition.name][condition.nodes]
             points = self.mesh.points[condition.nodes]
             values = amount(condition.value, points, step.t, step.factor)
-            defined = numbers >= 0
-            numbers, values, nodes = numbers[defined], values[defined], condition.nodes[defined]
-            conflicts = np.flatnonzero((by[numbers] >= 0) & (prescribed[numbers] != values))
+            defined = dofs >= 0
+            dofs, values, nodes = dofs[defined], values[defined], condition.nodes[defined]
+            conflicts = np.flatnonzero((by[dofs] >= 0) & (prescribed[dofs] != values))
             if len(conflicts):  # functions that agree at a corner do so but for rounding
                 all_of = self.numbering.nodal[condition.name]
                 size = np.nanmax(np.abs([*prescribed[all_of[all_of >= 0]], *values]))
-                differences = np.abs(prescribed[numbers[conflicts]] - values[conflicts])
+                differences = np.abs(prescribed[dofs[conflicts]] - values[conflicts])
                 conflicts = conflicts[differences > _SAME * size]
             if len(conflicts):
                 i = int(conflicts[0])
-                first = self.conditions[int(by[numbers[i]])]
+                first = self.conditions[int(by[dofs[i]])]
                 raise StudyError(
                     f"{condition.name} at node {nodes[i]} "
                     f"{place_text(self.mesh.points[nodes[i]])} is prescribed twice: "
-                    f"{prescribed[numbers[i]]:g} by {first.call}, {values[i]:g} by {condition.call}"
+                    f"{prescribed[dofs[i]]:g} by {first.call}, {values[i]:g} by {condition.call}"
                 )
-            prescribed[numbers], by[numbers] = values, k
+            prescribed[dofs], by[dofs] = values, k
         fixed = np.flatnonzero(by >= 0)
         return fixed, prescribed[fixed]

@@ -12,7 +12,7 @@ from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.definition.element_blocks import facet_nodes
 from softehl.runtime.definition.problem_definition import (
     Block,
-    Force,
+    Load,
     ProblemDefinition,
     StudyError,
 )
@@ -28,54 +28,54 @@ from softehl.runtime.suggestions import did_you_mean, join_names
 
 
 def build_system(
-    statement: ProblemDefinition, fields: Mapping[str, Sequence[str]] | None = None
+    definition: ProblemDefinition, fields: Mapping[str, Sequence[str]] | None = None
 ) -> System:
-    """Equations of a statement; fields: see `Numbering.of`.
+    """Return the discrete equations of a definition; fields: see `Numbering.of`.
 
     Raises StudyError for what does not fit together.
     """
-    if not statement.blocks:
+    if not definition.blocks:
         raise StudyError("there are no elements: add a page, study.add('body', 'solid.py')")
-    mesh, pages = statement.mesh, statement.blocks.values()
-    _warn_of_holes(statement)
-    elements = [Elements(b.name, b.nodes, b.slots, b.shared, b.form.dof_tables) for b in pages]
+    mesh, pages = definition.mesh, definition.blocks.values()
+    _warn_of_holes(definition)
+    elements = [Elements(b.name, b.nodes, b.slots, b.shared, b.options.dof_tables) for b in pages]
     try:
         numbering = Numbering.of(len(mesh.points), elements, fields)
     except ValueError as error:
         raise StudyError(str(error)) from None
-    for c in statement.conditions:
+    for c in definition.conditions:
         _require(c.name, c.nodes, numbering, c.call, somewhere=mesh.anywhere)
-    forces, implied = _forces(statement, numbering)
+    forces, implied = _forces(definition, numbering)
     ties = {f.label: len(f.nodes) for f in forces if isinstance(f.kernel, Tie)}
     layout = replace(
         numbering.layout,
         names=(*numbering.layout.names, *ties),
         counts=(*numbering.layout.counts, *ties.values()),
     )
-    writer = _Writer(mesh, replace(numbering, layout=layout))
+    writer = _BlockBuilder(mesh, replace(numbering, layout=layout))
     blocks = [writer.page(b) for b in pages] + [writer.force(f) for f in forces if len(f.nodes)]
-    contacts = {t.name: contact_of(statement, numbering, t) for t in statement.contacts}
+    contacts = {t.name: contact_of(definition, numbering, t) for t in definition.contacts}
     blocks += [block for contact in contacts.values() for block in contact.empty()]
     system = System(
         mesh,
         writer.numbering,
         Assembler.build(layout.total, blocks),
-        dict(statement.blocks),
-        (*statement.conditions,),
+        dict(definition.blocks),
+        (*definition.conditions,),
         implied,
-        _at_start(statement, numbering),
-        statement=statement,
-        written=statement.count,
+        _at_start(definition, numbering),
+        definition=definition,
+        definition_size=definition.size,
     )
     return with_contacts(system, contacts)
 
 
-def _warn_of_holes(statement: ProblemDefinition) -> None:
+def _warn_of_holes(definition: ProblemDefinition) -> None:
     """Warn of cells without elements, where other cells have some: a body with a hole."""
-    mesh = statement.mesh
+    mesh = definition.mesh
     bare: dict[str, Flags] = {}
     for kind, nodes in mesh.cells.items():
-        block_nodes = [block.nodes for block in statement.blocks.values() if block.kind == kind]
+        block_nodes = [block.nodes for block in definition.blocks.values() if block.kind == kind]
         if any(part is nodes or np.array_equal(part, nodes) for part in block_nodes):
             continue
         with_elements = np.concatenate([nodes[:0], *block_nodes])
@@ -102,16 +102,16 @@ def _warn_of_holes(statement: ProblemDefinition) -> None:
 
 
 def _forces(
-    statement: ProblemDefinition, numbering: Numbering
-) -> tuple[tuple[Force, ...], tuple[Force, ...]]:
+    definition: ProblemDefinition, numbering: Numbering
+) -> tuple[tuple[Load, ...], tuple[Load, ...]]:
     """Forces to be solved for, and ties both sides of which are prescribed."""
     forces, implied = [], []
-    for force in statement.forces:
+    for force in definition.forces:
         for name in force.names:
             _require(name, force.nodes, numbering, force.label)
         if isinstance(force.kernel, Tie):
             # where both sides are prescribed nothing is left for a multiplier to do
-            both = np.isin(force.nodes, statement.prescribed(force.names[0])).all(axis=1)
+            both = np.isin(force.nodes, definition.prescribed(force.names[0])).all(axis=1)
             implied.append(replace(force, nodes=force.nodes[both]))
             force = replace(force, nodes=force.nodes[~both])
         forces.append(force)
@@ -138,20 +138,20 @@ def _require(
         raise StudyError(f"{context}: no page has the unknown {name!r} there")
 
 
-def _at_start(statement: ProblemDefinition, numbering: Numbering) -> dict[str, Array]:
+def _at_start(definition: ProblemDefinition, numbering: Numbering) -> dict[str, Array]:
     """Unknown -> its values at every node, (points,), nan where nothing was said."""
     initial_values: dict[str, Array] = {}
-    for start in statement.start:
-        somewhere = statement.mesh.anywhere
+    for start in definition.start:
+        somewhere = definition.mesh.anywhere
         context = f"start({start.name}=...)"
         _require(start.name, start.nodes, numbering, context, somewhere=somewhere)
-        values = initial_values.setdefault(start.name, np.full(len(statement.mesh.points), np.nan))
+        values = initial_values.setdefault(start.name, np.full(len(definition.mesh.points), np.nan))
         values[start.nodes] = start.values
     return initial_values
 
 
 @dataclass(frozen=True, eq=False)
-class _Writer:
+class _BlockBuilder:
     """Blocks of an assembler on a mesh with numbered unknowns."""
 
     mesh: Mesh
@@ -168,12 +168,12 @@ class _Writer:
         return ElementBlock(
             *(block.name, block.kernel, coordinates, self.numbering.dofs[block.name]),
             data=data,
-            rule=block.form.rule,
-            constant=block.form.constant,
+            rule=block.options.rule,
+            constant=block.options.constant,
             check_orientation=facet_nodes(block.kernel) is None,
         )
 
-    def force(self, force: Force) -> ElementBlock:
+    def force(self, force: Load) -> ElementBlock:
         dofs = self.numbering.at(force.names, force.nodes)
         coordinates = self.mesh.points[force.nodes].reshape(len(dofs), -1)
         if isinstance(force.kernel, Tie):

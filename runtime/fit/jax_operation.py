@@ -12,7 +12,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.fit.objective import Trials
+from softehl.runtime.fit.objective import StudyEvaluations
 from softehl.runtime.sensitivity.jacobian import jacobian
 from softehl.runtime.sensitivity.quantities import UserQuantity
 
@@ -35,7 +35,7 @@ class Operation:
         The study, solved for values of inputs.
     """
 
-    trials: Trials
+    trials: StudyEvaluations
 
     @property
     def start(self) -> Array:

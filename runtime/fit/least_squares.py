@@ -13,7 +13,7 @@ from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.definition.argument_checks import finite
 from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.problem_checks import ProblemError
-from softehl.runtime.fit.objective import Trials
+from softehl.runtime.fit.objective import StudyEvaluations
 from softehl.runtime.kernels.kernel_call import ArgumentError
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity.input_parsing import By
@@ -203,7 +203,7 @@ class Fit:
 class LeastSquares:
     """Least squares of measurements: trials, data, their standard deviations (m,)."""
 
-    trials: Trials
+    trials: StudyEvaluations
     data: Measurements
     sigma: Array | None
 
@@ -317,5 +317,5 @@ def fit(
         times = dt * np.arange(1, round(until / dt) + 1)
     data = Measurements.read(measured, times)
     deviations = None if sigma is None else np.broadcast_to(sigma, data.numbers.shape).copy()
-    trials = Trials.by(definition, by, arguments)
+    trials = StudyEvaluations.by(definition, by, arguments)
     return LeastSquares(trials, data, deviations).fit(bounds, most)

@@ -25,7 +25,7 @@ from softehl.runtime.suggestions import short_list
 
 
 @dataclass(eq=False)
-class Trials:
+class StudyEvaluations:
     """Results of a study for values of its inputs, (k,); the latest are cached.
 
     arguments: of `solve`, or of `march` if there is a dt. count: how often the study was solved.
@@ -39,7 +39,9 @@ class Trials:
     _cached_values: Array | None = None
 
     @classmethod
-    def by(cls, definition: ProblemDefinition, by: By, arguments: Mapping[str, Any]) -> Trials:
+    def by(
+        cls, definition: ProblemDefinition, by: By, arguments: Mapping[str, Any]
+    ) -> StudyEvaluations:
         """Return the trials of a definition by inputs.  Raises StudyError."""
         return cls(definition, input_parsing.inputs(definition, by), arguments)
 
@@ -85,7 +87,7 @@ class Objective:
         The quantity.
     """
 
-    trials: Trials
+    trials: StudyEvaluations
     quantity: Quantity
 
     def __repr__(self) -> str:
@@ -137,7 +139,7 @@ def objective(
     arguments: Mapping[str, Any],
 ) -> Objective:
     """Return a quantity as a function of inputs; see `Study.objective`."""
-    return Objective(Trials.by(definition, by, arguments), quantity(what, at, reaction))
+    return Objective(StudyEvaluations.by(definition, by, arguments), quantity(what, at, reaction))
 
 
 def varied_definition(

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.definition.problem_definition import Block, Force, StudyError
+from softehl.runtime.definition.problem_definition import Block, Load, StudyError
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.dofmap import Numbering
 from softehl.runtime.discretisation.element_blocks import ElementBlock
@@ -235,13 +235,15 @@ def _page(block: Block, rows: Integers) -> Block:
     return replace(
         block,
         nodes=block.nodes[rows],
-        form=replace(block.form, along={n: p[rows] for n, p in block.form.dof_tables.items()}),
+        options=replace(
+            block.options, along={n: p[rows] for n, p in block.options.dof_tables.items()}
+        ),
         data={name: values[rows] for name, values in block.data.items()},
         initial=_rows_or_none(block.initial, rows),
     )
 
 
-def _implied(force: Force, numbering: Numbering) -> Force:
+def _implied(force: Load, numbering: Numbering) -> Load:
     mask = (numbering.nodal[force.names[0]][force.nodes] >= 0).all(axis=1)
     return replace(force, nodes=force.nodes[mask])
 

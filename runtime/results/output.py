@@ -18,7 +18,7 @@ from softehl.runtime.mesh.readers.meshio import import_meshio
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class VtuFields:
     """Mesh and fields of a file.
 
     points: (n, dim). cells: kind -> nodes (m, k). nodal: name -> (n,). cellwise: name -> kind ->
@@ -38,7 +38,7 @@ class Picture:
         nodal: Mapping[str, Array],
         blocks: Mapping[str, Block],
         fields: Callable[[str], Mapping[str, Array]],
-    ) -> Picture:
+    ) -> VtuFields:
         """With the means of the fields, (cells, points), of blocks that stand on these cells."""
         rows = {kind: {tuple(r): k for k, r in enumerate(n.tolist())} for kind, n in cells.items()}
         cellwise: dict[str, dict[str, Array]] = {}
@@ -52,14 +52,14 @@ class Picture:
                 cellwise[f"{name}.{label}"] = data
         return cls(points, cells, nodal, cellwise)
 
-    def compact(self) -> Picture:
+    def compact(self) -> VtuFields:
         """Without the points that no cell has."""
         used = np.unique(np.concatenate([np.empty(0, np.int64), *map(np.ravel, _lists(self))]))
         number = np.zeros(len(self.points), dtype=np.int64)
         number[used] = np.arange(len(used))
         cells = {kind: number[nodes] for kind, nodes in self.cells.items()}
         nodal = {name: values[used] for name, values in self.nodal.items()}
-        return Picture(self.points[used], cells, nodal, self.cellwise)
+        return VtuFields(self.points[used], cells, nodal, self.cellwise)
 
     def write(self, path: Path) -> None:
         """Write .vtu, atomically."""
@@ -118,7 +118,7 @@ def piece_names(path: Path, count: int) -> list[str]:
     return [f"{path.stem}_{number:04d}.vtu" for number in range(count)]
 
 
-def _lists(picture: Picture) -> list[Integers]:
+def _lists(picture: VtuFields) -> list[Integers]:
     return list(picture.cells.values())
 
 

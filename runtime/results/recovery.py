@@ -33,7 +33,7 @@ def nodal_operator(block: Block, recovery: str) -> tuple[Integers, Array]:
         raise StudyError(
             f"recovery = {recovery!r}: allowed are {join_names(map(repr, RECOVERIES))}"
         )
-    rule = block.form.rule or block.kernel.default_rule
+    rule = block.options.rule or block.kernel.default_rule
     cell, facet = CELLS[block.kind], facet_nodes(block.kernel)
     nodes = block.nodes if facet is None else block.nodes[:, facet]
     count = len(rule.weights)
@@ -65,7 +65,7 @@ def projection(cell: Cell, rule: Rule, degree: int) -> Array:
 
 def _order(block: Block, cell: Cell) -> int:
     """Order of the shape functions, or of a field along the elements."""
-    along = block.form.along.values()
+    along = block.options.along.values()
     orders = [a if isinstance(a, int) else np.shape(a)[1] - 1 for a in along]
     return max(cell.order, *orders, 1)
 

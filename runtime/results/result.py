@@ -21,13 +21,13 @@ from softehl.runtime.equations.eigenproblems import natural_modes
 from softehl.runtime.equations.interpolation import (
     at_every_node,
     interpolate_nodal,
-    interpolation,
+    interpolate_unknowns,
 )
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.stability import negative_directions
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError, place_text
-from softehl.runtime.results.output import Picture, piece_names
+from softehl.runtime.results.output import VtuFields, piece_names
 from softehl.runtime.results.recovery import nodal_operator
 from softehl.runtime.sensitivity.input_parsing import By, inputs
 from softehl.runtime.sensitivity.inputs import Input, Key
@@ -146,8 +146,8 @@ class Result:
         UnknownNameError
             There is no such unknown; a KeyError.
         """
-        numbers = self._global_system.numbering.nodal.get(name)
-        if numbers is None:
+        dofs = self._global_system.numbering.nodal.get(name)
+        if dofs is None:
             layout = self._global_system.numbering.layout
             if name not in layout.names:
                 suggestions = (
@@ -157,7 +157,7 @@ class Result:
                     f"no unknown {name!r}{self._field_called(name) or suggestions}"
                 )
             return self.x[layout.part(name)]
-        return np.where(numbers >= 0, self.x[numbers], np.nan)
+        return np.where(dofs >= 0, self.x[dofs], np.nan)
 
     def _field_called(self, name: str) -> str:
         """A hint at the block whose field a name is, for messages."""
@@ -282,7 +282,7 @@ class Result:
         """Unknowns at each place (n, dim), None outside; a warning where bodies differ."""
         mesh, interpolated = (
             self._global_system.mesh,
-            interpolation(self._global_system, points, group),
+            interpolate_unknowns(self._global_system, points, group),
         )
         located, values = interpolated.located, interpolated.values(self.x)
         jump = interpolated.jump(self.x)
@@ -389,8 +389,8 @@ class Result:
         """
         x, assembler = self.point.solution.x, self.problem.assembler
         holding = [b.name for b in assembler.blocks if isinstance(b.kernel, Spring | Tie)]
-        others = {n: v for n, v in self.problem.parameters.items() if n not in holding}
-        local_forces = assembler.residual(x, others)
+        other_parameters = {n: v for n, v in self.problem.parameters.items() if n not in holding}
+        local_forces = assembler.residual(x, other_parameters)
         return self.system.comm.gather_forces(local_forces)
 
     @property
@@ -522,14 +522,14 @@ class Result:
         return derivative(*self._differentiated(by))
 
     def _differentiated(self, by: By) -> tuple[Tape, list[Input]]:
-        statement = self.system.everywhere.statement
-        if self.trail is None or statement is None:
+        definition = self.system.everywhere.definition
+        if self.trail is None or definition is None:
             raise StudyError(
                 "this result has no derivatives: results of solve, follow and march by euler "
                 "or bdf2 have them"
             )
         self.trail.chain()
-        return self.trail, inputs(statement, by)
+        return self.trail, inputs(definition, by)
 
     def deformed(self, names: tuple[str, ...]) -> Array:
         """Return the nodes' coordinates in the deformed state.
@@ -544,8 +544,8 @@ class Result:
         array (points, dim)
             Reference coordinates plus displacements [mm].
         """
-        moved = np.stack([np.nan_to_num(self.values(name)) for name in names], axis=1)
-        return np.asarray(self.system.mesh.points + moved)
+        displacements = np.stack([np.nan_to_num(self.values(name)) for name in names], axis=1)
+        return np.asarray(self.system.mesh.points + displacements)
 
     def write(self, path: str | Path) -> None:
         """Write the mesh with unknowns and fields to a file for ParaView.
@@ -585,14 +585,14 @@ class Result:
                 picture.write(target)
         share.barrier()
 
-    def _picture(self, system: System, cells: Mapping[str, Integers], x: Array) -> Picture:
+    def _picture(self, system: System, cells: Mapping[str, Integers], x: Array) -> VtuFields:
         """Of all unknowns x, or of those of this process with its own fields."""
         nodal = at_every_node(system, x)
         for name, block in self._global_system.blocks.items():
             if block.kernel.fields and CELLS[block.kind].dimension:
                 nodal |= {f"{name}.{label}": v for label, v in self.at_nodes(name).items()}
         fields = self.fields if system is self._global_system else self._local_fields
-        return Picture.of(system.mesh.points, cells, nodal, system.blocks, fields)
+        return VtuFields.of(system.mesh.points, cells, nodal, system.blocks, fields)
 
     def _local_cells(self) -> dict[str, Integers]:
         """Cells of the elements of this process; on process 0 also those that have no elements."""

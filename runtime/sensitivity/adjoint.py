@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.sensitivity.element_derivatives import Elements
+from softehl.runtime.sensitivity.element_derivatives import ElementDerivatives
 from softehl.runtime.sensitivity.inputs import Input
 from softehl.runtime.sensitivity.linearised_step import LinearisedStep
 from softehl.runtime.sensitivity.quantities import Quantity
@@ -16,7 +16,7 @@ from softehl.runtime.sensitivity.tape import Tape, blocks_with_history, time_cou
 
 
 @dataclass(eq=False)
-class _Back:
+class _AdjointState:
     """Derivatives of the quantity by what a step leaves behind.
 
     states: by the unknowns after it, and after the step before it, (n,) each. histories: by the
@@ -33,91 +33,93 @@ def gradient(chain: Sequence[Tape], quantity: Quantity, inputs: Sequence[Input])
     last = LinearisedStep(chain[-1])
     weights = quantity.weights(last)
     n = len(chain[-1].x)
-    back = _Back([quantity.slope(last), np.zeros(n)])
+    state = _AdjointState([quantity.slope(last), np.zeros(n)])
     for tape in reversed(chain):
-        linear = last if tape is chain[-1] else LinearisedStep(tape)
+        step = last if tape is chain[-1] else LinearisedStep(tape)
         first = tape is chain[0]
-        back = _step(linear, back, weights, inputs, gradients, first=first)
+        state = _step(step, state, weights, inputs, gradients, first=first)
         weights = np.zeros(n)
     return gradients
 
 
 def _step(
-    linear: LinearisedStep,
-    back: _Back,
+    step: LinearisedStep,
+    state: _AdjointState,
     weights: Array,
     inputs: Sequence[Input],
     gradients: list[Array],
     *,
     first: bool,
-) -> _Back:
+) -> _AdjointState:
     """Go one step back; what the inputs do in it is added to what was found.
 
     weights: (n,) of the forces that make reactions, in the quantity.
     """
-    slope = back.states[0].copy()
-    for name, mu in back.histories.items():
-        _by_unknowns(slope, linear.blocks[name], mu)
-    adjoint = linear.adjoint(slope)
-    acting = linear.reacting()
-    pulls = {
-        name: _Pull(
+    slope = state.states[0].copy()
+    for name, mu in state.histories.items():
+        _by_unknowns(slope, step.blocks[name], mu)
+    adjoint = step.adjoint(slope)
+    acting = step.reacting()
+    element_gradients = {
+        name: _ElementGradient(
             elements,
             (weights - adjoint if name in acting else -adjoint)[elements.block.dofs],
-            back.histories.get(name),
+            state.histories.get(name),
         )
-        for name, elements in linear.blocks.items()
+        for name, elements in step.blocks.items()
     }
-    held_slope = slope - linear.transposed_times(adjoint)
+    held_slope = slope - step.transposed_times(adjoint)
     for item, total in zip(inputs, gradients, strict=True):
-        moves = item.seeds(linear.tape)
+        moves = item.seeds(step.tape)
         for column in moves.columns:
-            if column.block in pulls:
-                column.pull(total, pulls[column.block].by(column.column))
+            if column.block in element_gradients:
+                column.pull(total, element_gradients[column.block].by(column.column))
         for prescribed in moves.prescribed:
             mask = prescribed.target >= 0
-            rates = prescribed.factor[mask] * held_slope[prescribed.numbers[mask]]
+            rates = prescribed.factor[mask] * held_slope[prescribed.dofs[mask]]
             np.add.at(total, prescribed.target[mask], rates)
-    return _Back([]) if first else _previous_step(linear, back, pulls)
+    return _AdjointState([]) if first else _previous_step(step, state, element_gradients)
 
 
-def _previous_step(linear: LinearisedStep, back: _Back, pulls: dict[str, _Pull]) -> _Back:
+def _previous_step(
+    step: LinearisedStep, back: _AdjointState, element_gradients: dict[str, _ElementGradient]
+) -> _AdjointState:
     """Derivatives by what the step before leaves behind."""
-    earlier = [back.states[1], np.zeros(len(linear.tape.x))]
-    for c in time_couplings(linear.tape):
-        gradient = pulls[c.block].by(c.column)
+    earlier = [back.states[1], np.zeros(len(step.tape.x))]
+    for c in time_couplings(step.tape):
+        gradient = element_gradients[c.block].by(c.column)
         for weight, state in zip(c.weights, earlier, strict=False):
-            np.add.at(state, c.numbers, weight * gradient)
+            np.add.at(state, c.dofs, weight * gradient)
     histories = {}
-    for name in blocks_with_history(linear.tape):
-        mu = pulls[name].by_history()
-        kernel = linear.tape.system.blocks[name].kernel
+    for name in blocks_with_history(step.tape):
+        mu = element_gradients[name].by_history()
+        kernel = step.tape.system.blocks[name].kernel
         for column, datum in enumerate(kernel.point_data):
             after = back.histories.get(name)
             if datum not in kernel.history and after is not None:
                 mu[:, :, column] += after[:, :, column]
         histories[name] = mu
-    return _Back(earlier, histories)
+    return _AdjointState(earlier, histories)
 
 
-def _by_unknowns(slope: Array, elements: Elements, mu: Array) -> None:
+def _by_unknowns(slope: Array, elements: ElementDerivatives, mu: Array) -> None:
     """Add the derivative by the unknowns of mu times the history after the step."""
     if not mu.any():
         return
     zero_rows, dofs = elements.zero_rows(), elements.block.dofs
     for k in range(dofs.shape[1]):
-        moved = np.zeros(dofs.shape)
-        moved[:, k] = 1.0
-        np.add.at(slope, dofs[:, k], _dot(mu, elements.history(zero_rows, moved)))
+        direction = np.zeros(dofs.shape)
+        direction[:, k] = 1.0
+        np.add.at(slope, dofs[:, k], _dot(mu, elements.history(zero_rows, direction)))
 
 
 @dataclass(frozen=True, eq=False)
-class _Pull:
+class _ElementGradient:
     """Derivatives by the arguments of the elements of a block, of left (n, ndof) times their
     residuals plus mu times their history after the step.
     """
 
-    elements: Elements
+    elements: ElementDerivatives
     left: Array
     mu: Array | None
     _cached: dict[int, Array] = field(default_factory=dict)
@@ -138,15 +140,15 @@ class _Pull:
         zero_rows, (_, points, count) = self.elements.zero_rows(), block.point_data.shape
         for k in range(count):
             for q in range(points):
-                moved = np.zeros(gradient.shape)
-                moved[:, q, k] = 1.0
-                gradient[:, q, k] = (self.left * self.elements.residual(zero_rows, moved)).sum(
+                direction = np.zeros(gradient.shape)
+                direction[:, q, k] = 1.0
+                gradient[:, q, k] = (self.left * self.elements.residual(zero_rows, direction)).sum(
                     axis=1
                 )
             if self.mu is not None and self.mu.any():
-                moved = np.zeros(gradient.shape)
-                moved[:, :, k] = 1.0
-                after = self.elements.history(zero_rows, None, moved)
+                direction = np.zeros(gradient.shape)
+                direction[:, :, k] = 1.0
+                after = self.elements.history(zero_rows, None, direction)
                 gradient[:, :, k] += (self.mu * after).sum(axis=2)
         return gradient
 

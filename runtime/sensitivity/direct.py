@@ -14,7 +14,7 @@ from softehl.runtime.sensitivity.tape import Tape, blocks_with_history, time_cou
 
 
 @dataclass(eq=False)
-class _Front:
+class _DirectState:
     """Rates along one input after the steps so far, latest first: unknowns (n,), point data."""
 
     states: list[Array] = field(default_factory=list)
@@ -28,7 +28,7 @@ class Rates:
     """
 
     tape: Tape
-    linear: LinearisedStep
+    step: LinearisedStep
     unknowns: Array
     forces: Array
 
@@ -37,68 +37,68 @@ def along_path(chain: Sequence[Tape], inputs: Sequence[Input]) -> Iterator[Rates
     """Derivatives after each step of a chain by all components of the inputs."""
     seeds = [(k, j) for k, item in enumerate(inputs) for j in range(len(item.value))]
     sizes = [len(item.value) for item in inputs]
-    fronts = [_Front() for _ in seeds]
+    fronts = [_DirectState() for _ in seeds]
     for tape in chain:
-        linear = LinearisedStep(tape)
+        step = LinearisedStep(tape)
         moves = [item.seeds(tape) for item in inputs]
         rates = []
-        for (k, j), front in zip(seeds, fronts, strict=True):
+        for (k, j), state in zip(seeds, fronts, strict=True):
             seed = np.zeros(sizes[k])
             seed[j] = 1.0
-            rates.append(_step(linear, moves[k], seed, front))
+            rates.append(_step(step, moves[k], seed, state))
         unknowns, forces = (np.stack(part, axis=1) for part in zip(*rates, strict=True))
-        yield Rates(tape, linear, unknowns, forces)
+        yield Rates(tape, step, unknowns, forces)
 
 
 def _step(
-    linear: LinearisedStep, moves: InputSeeds, seed: Array, front: _Front
+    step: LinearisedStep, moves: InputSeeds, seed: Array, state: _DirectState
 ) -> tuple[Array, Array]:
     """Go one step on along one component of an input."""
-    rows = _rows(linear, moves, seed, front)
+    rows = _rows(step, moves, seed, state)
     parts: dict[str, Array] = {}
-    for name, elements in linear.blocks.items():
-        history = front.histories.get(name)
+    for name, elements in step.blocks.items():
+        history = state.histories.get(name)
         if rows.get(name) is not None or (history is not None and history.any()):
             parts[name] = elements.residual(rows.get(name, elements.zero_rows()), history)
-    prescribed = np.zeros(len(linear.tape.x))
+    prescribed = np.zeros(len(step.tape.x))
     for h in moves.prescribed:
         mask = h.target >= 0
-        prescribed[h.numbers[mask]] = h.factor[mask] * seed[h.target[mask]]
-    dx = linear.solve(-linear.summed(parts), prescribed)
-    for name in blocks_with_history(linear.tape):
-        elements = linear.blocks[name]
-        moved = dx[elements.block.dofs]
+        prescribed[h.dofs[mask]] = h.factor[mask] * seed[h.target[mask]]
+    dx = step.solve(-step.summed(parts), prescribed)
+    for name in blocks_with_history(step.tape):
+        elements = step.blocks[name]
+        direction = dx[elements.block.dofs]
         block_rows = rows.get(name, elements.zero_rows())
-        previous = front.histories.get(name)
-        after = elements.history(block_rows, moved, previous)
-        _keep_still(linear, name, after, previous)
-        front.histories[name] = after
-    front.states = [dx, *front.states][:2]
-    acting = linear.reacting()
-    forces = linear.summed({n: v for n, v in parts.items() if n in acting})
+        previous = state.histories.get(name)
+        after = elements.history(block_rows, direction, previous)
+        _keep_still(step, name, after, previous)
+        state.histories[name] = after
+    state.states = [dx, *state.states][:2]
+    acting = step.reacting()
+    forces = step.summed({n: v for n, v in parts.items() if n in acting})
     return dx, forces
 
 
-def _keep_still(linear: LinearisedStep, name: str, after: Array, previous: Array | None) -> None:
+def _keep_still(step: LinearisedStep, name: str, after: Array, previous: Array | None) -> None:
     """Leave point data that are no history as they are."""
-    kernel = linear.tape.system.blocks[name].kernel
+    kernel = step.tape.system.blocks[name].kernel
     for column, datum in enumerate(kernel.point_data):
         if datum not in kernel.history and previous is not None:
             after[:, :, column] = previous[:, :, column]
 
 
 def _rows(
-    linear: LinearisedStep, moves: InputSeeds, seed: Array, front: _Front
+    step: LinearisedStep, moves: InputSeeds, seed: Array, front: _DirectState
 ) -> Mapping[str, Array]:
     """Rates of the arguments of all blocks that move."""
     rows: dict[str, Array] = {}
     for column in moves.columns:
-        if column.block in linear.blocks:
-            into = rows.setdefault(column.block, linear.blocks[column.block].zero_rows())
+        if column.block in step.blocks:
+            into = rows.setdefault(column.block, step.blocks[column.block].zero_rows())
             column.push(into, seed)
     if front.states:
-        for c in time_couplings(linear.tape):
-            into = rows.setdefault(c.block, linear.blocks[c.block].zero_rows())
+        for c in time_couplings(step.tape):
+            into = rows.setdefault(c.block, step.blocks[c.block].zero_rows())
             for weight, state in zip(c.weights, front.states, strict=False):
-                into[:, c.column] += weight * state[c.numbers]
+                into[:, c.column] += weight * state[c.dofs]
     return rows

@@ -23,7 +23,7 @@ _WIDE = 1e-3
 _WEIGHTS = ((1, 45.0), (2, -9.0), (3, 1.0))
 
 
-class Elements:
+class ElementDerivatives:
     """The elements of a block in a converged step.
 
     width: of rows, the arguments that may move: coordinates, data and parameters of a page,
@@ -65,8 +65,8 @@ class Elements:
         dofs: (n, ndof) rates of the unknowns, None for none.
         """
         assert self.page is not None
-        kernel, moved = self._kernel("fields_rate"), np.zeros_like(self.dofs)
-        along = np.hstack([rows, moved if dofs is None else dofs])
+        kernel, direction = self._kernel("fields_rate"), np.zeros_like(self.dofs)
+        along = np.hstack([rows, direction if dofs is None else dofs])
         arguments = self._arguments(history)
         rates = kernel.fields_rate(self.block.coordinates, self.dofs, along, **arguments)
         page = self.page.kernel
@@ -81,8 +81,8 @@ class Elements:
         arguments = block.given(self.parameters)
         if block.point_data is None:
             return arguments
-        moved = np.zeros_like(block.point_data) if history is None else history
-        return {**arguments, "point_data": np.concatenate([block.point_data, moved], axis=2)}
+        direction = np.zeros_like(block.point_data) if history is None else history
+        return {**arguments, "point_data": np.concatenate([block.point_data, direction], axis=2)}
 
     def _kernel(self, task: str) -> Kernel:
         """The kernel of derivatives.  Raises StudyError where there is none."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from softehl.runtime.definition.problem_definition import (
     Block,
-    Force,
+    Load,
     ProblemDefinition,
     StudyError,
     display_name,
@@ -31,7 +31,7 @@ By: TypeAlias = Mapping[str, Any]
 _FORM = 'by={"rubber": ["mu", "K"]}'
 
 
-def inputs(statement: ProblemDefinition, by: By) -> list[Input]:
+def inputs(definition: ProblemDefinition, by: By) -> list[Input]:
     """The inputs that are meant, in order.  Raises StudyError for a name that is not there."""
     if not isinstance(by, Mapping) or not by:
         raise StudyError(f"by = {by!r}: say by what, as in {_FORM}")
@@ -44,40 +44,40 @@ def inputs(statement: ProblemDefinition, by: By) -> list[Input]:
             mode = names[name] if isinstance(names, Mapping) else None
             if mode is not None and owner != "nodes":
                 raise StudyError(f'by: modes are those of "nodes", not of {owner!r}')
-            selected.append(_input(statement, owner, name, mode))
+            selected.append(_input(definition, owner, name, mode))
     return selected
 
 
-def inputs_of_keys(statement: ProblemDefinition, keys: Sequence[tuple[str, str]]) -> list[Input]:
+def inputs_of_keys(definition: ProblemDefinition, keys: Sequence[tuple[str, str]]) -> list[Input]:
     """Inputs by their keys.  Raises StudyError."""
     for key in keys:
         if not (isinstance(key, tuple) and len(key) == 2):
             raise StudyError(f'{key!r}: an input is a pair, ("rubber", "mu")')
-    return [_input(statement, owner, name, None) for owner, name in keys]
+    return [_input(definition, owner, name, None) for owner, name in keys]
 
 
-def _input(statement: ProblemDefinition, owner: str, name: str, mode: Any) -> Input:
-    blocks = _blocks(statement, owner)
+def _input(definition: ProblemDefinition, owner: str, name: str, mode: Any) -> Input:
+    blocks = _blocks(definition, owner)
     if blocks:
         return _of_page(owner, name, blocks)
     head, _, side = str(owner).partition(":")
     if head == "nodes":
-        return _of_nodes(statement, owner, name, side, mode)
-    if head == "fix" and side in {_plain(c.where) for c in statement.conditions}:
-        return _support(statement, owner, name, side)
-    if any(_key_of(f) == owner for f in statement.forces):
-        return _amounts(statement, owner, name)
-    owners = [*statement.blocks, *dict.fromkeys(_key_of(f) for f in statement.forces)]
-    owners += dict.fromkeys(f"fix:{_plain(c.where)}" for c in statement.conditions)
+        return _of_nodes(definition, owner, name, side, mode)
+    if head == "fix" and side in {_plain(c.where) for c in definition.conditions}:
+        return _support(definition, owner, name, side)
+    if any(_key_of(f) == owner for f in definition.forces):
+        return _amounts(definition, owner, name)
+    owners = [*definition.blocks, *dict.fromkeys(_key_of(f) for f in definition.forces)]
+    owners += dict.fromkeys(f"fix:{_plain(c.where)}" for c in definition.conditions)
     owners.append("nodes")
     raise StudyError(
         f"by: there is no {owner!r}{did_you_mean(owner, owners)}; there are {join_names(owners)}"
     )
 
 
-def _blocks(statement: ProblemDefinition, owner: str) -> list[Block]:
+def _blocks(definition: ProblemDefinition, owner: str) -> list[Block]:
     """Of that name, on all kinds of cells."""
-    blocks = statement.blocks
+    blocks = definition.blocks
     if owner in blocks:
         return [blocks[owner]]
     return [b for n, b in blocks.items() if n == f"{owner}:{b.kernel.cell}"]
@@ -96,16 +96,16 @@ def _of_page(owner: str, name: str, blocks: list[Block]) -> Input:
     )
 
 
-def _support(statement: ProblemDefinition, owner: str, name: str, where: str) -> Input:
-    conditions = [(k, c) for k, c in enumerate(statement.conditions) if _plain(c.where) == where]
+def _support(definition: ProblemDefinition, owner: str, name: str, where: str) -> Input:
+    conditions = [(k, c) for k, c in enumerate(definition.conditions) if _plain(c.where) == where]
     matching = [(k, c) for k, c in conditions if c.name == name]
     _require_matches(owner, name, matching, [c.name for _, c in conditions])
     _require_equal_values(owner, name, [c.value for _, c in matching])
     return SupportValue((owner, name), [k for k, _ in matching], [c for _, c in matching])
 
 
-def _amounts(statement: ProblemDefinition, owner: str, name: str) -> Input:
-    forces = [(k, f) for k, f in enumerate(statement.forces) if _key_of(f) == owner]
+def _amounts(definition: ProblemDefinition, owner: str, name: str) -> Input:
+    forces = [(k, f) for k, f in enumerate(definition.forces) if _key_of(f) == owner]
     pressure = owner.startswith("pressure:")
     matching = [
         (k, f) for k, f in forces if name == "pressure" or (not pressure and name in f.names)
@@ -116,8 +116,8 @@ def _amounts(statement: ProblemDefinition, owner: str, name: str) -> Input:
     return LoadAmount((owner, name), [k for k, _ in matching], [f for _, f in matching])
 
 
-def _of_nodes(statement: ProblemDefinition, owner: str, name: str, side: str, mode: Any) -> Input:
-    mesh = statement.mesh
+def _of_nodes(definition: ProblemDefinition, owner: str, name: str, side: str, mode: Any) -> Input:
+    mesh = definition.mesh
     points, dimension = mesh.points.shape
     targets = np.zeros(points, dtype=np.int64)
     if mode is not None:
@@ -155,21 +155,21 @@ def _require_matches(
 
 
 def _require_equal_values(owner: str, name: str, values: Sequence[object]) -> None:
-    """Raise StudyError for several statements of one place with different values."""
+    """Raise StudyError for several values of one support or load."""
     if any(value is not values[0] and value != values[0] for value in values):
         raise StudyError(
             f"by: {owner!r} has several values of {name!r}: give their places other names"
         )
 
 
-def _value_of(force: Force) -> object:
+def _value_of(force: Load) -> object:
     kernel: Any = force.kernel
     if isinstance(kernel, Spring):
         return kernel.stiffness
     return kernel.offset if isinstance(kernel, Tie) else kernel.value
 
 
-def _key_of(force: Force) -> str:
+def _key_of(force: Load) -> str:
     """As a load is asked for: "load:right"."""
     return f"{force.what}:{force.where}"
 

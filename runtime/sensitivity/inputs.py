@@ -1,6 +1,6 @@
 """Inputs by which results are differentiated: each knows the arguments that move with it.
 
-The value of an input may be read, and put into a statement. A function is differentiated by a
+The value of an input can be read, and put into a definition. A function is differentiated by a
 factor of it, which is 1.
 """
 
@@ -15,8 +15,8 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import (
     Block,
-    Condition,
-    Force,
+    Load,
+    PrescribedValues,
     ProblemDefinition,
     StudyError,
 )
@@ -53,10 +53,10 @@ class InputColumn:
 class PrescribedSeeds:
     """Prescribed values that move with an input.
 
-    numbers: (m,) unknowns. target, factor: (m,), as of `Column`.
+    dofs: (m,) unknowns. target, factor: (m,), as of `Column`.
     """
 
-    numbers: Integers
+    dofs: Integers
     target: Integers
     factor: Array
 
@@ -97,8 +97,8 @@ class Input(Protocol):
         """Arguments of elements and prescribed values that move with it in a step."""
         ...
 
-    def put(self, statement: ProblemDefinition, value: Array) -> None:
-        """Change a statement."""
+    def put(self, definition: ProblemDefinition, value: Array) -> None:
+        """Put a value into a definition."""
         ...
 
 
@@ -126,13 +126,13 @@ class PageParameter:
             columns.append(InputColumn(block.name, column, _one(n), np.full(n, float(rate))))
         return InputSeeds(columns)
 
-    def put(self, statement: ProblemDefinition, value: Array) -> None:
+    def put(self, definition: ProblemDefinition, value: Array) -> None:
         """See `Input`."""
         for block in self.blocks:
             changed_value = _changed(block.parameters[self.key[1]], float(value[0]))
-            parameters = {**statement.blocks[block.name].parameters, self.key[1]: changed_value}
-            changed = replace(statement.blocks[block.name], parameters=parameters)
-            statement.blocks[block.name] = changed
+            parameters = {**definition.blocks[block.name].parameters, self.key[1]: changed_value}
+            changed = replace(definition.blocks[block.name], parameters=parameters)
+            definition.blocks[block.name] = changed
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,13 +158,13 @@ class PageDatum:
             start += n
         return InputSeeds(columns)
 
-    def put(self, statement: ProblemDefinition, value: Array) -> None:
+    def put(self, definition: ProblemDefinition, value: Array) -> None:
         """See `Input`."""
         start = 0
         for block in self.blocks:
-            n, block_now = len(block.nodes), statement.blocks[block.name]
+            n, block_now = len(block.nodes), definition.blocks[block.name]
             data = {**block_now.data, self.key[1]: np.asarray(value[start : start + n]).copy()}
-            statement.blocks[block.name] = replace(block_now, data=data)
+            definition.blocks[block.name] = replace(block_now, data=data)
             start += n
 
 
@@ -174,7 +174,7 @@ class LoadAmount:
 
     key: Key
     numbers: Sequence[int]
-    forces: Sequence[Force]
+    forces: Sequence[Load]
     scalar: bool = True
 
     @property
@@ -193,14 +193,14 @@ class LoadAmount:
             columns.append(InputColumn(block.name, width, _one(n), np.ones(n)))
         return InputSeeds(columns)
 
-    def put(self, statement: ProblemDefinition, value: Array) -> None:
+    def put(self, definition: ProblemDefinition, value: Array) -> None:
         """See `Input`."""
         for number in self.numbers:
-            force = statement.forces[number]
+            force = definition.forces[number]
             name = _amount(force)
             changes = {name: _changed(getattr(force.kernel, name), float(value[0]))}
             kernel: Any = replace(force.kernel, **changes)  # type: ignore[arg-type]
-            statement.forces[number] = replace(force, kernel=kernel)
+            definition.forces[number] = replace(force, kernel=kernel)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +209,7 @@ class SupportValue:
 
     key: Key
     numbers: Sequence[int]
-    conditions: Sequence[Condition]
+    conditions: Sequence[PrescribedValues]
     scalar: bool = True
 
     @property
@@ -223,17 +223,17 @@ class SupportValue:
         for c in self.conditions:
             unit_value = c.value if callable(c.value) else 1.0
             rates = amount(unit_value, system.mesh.points[c.nodes], step.t, step.factor)
-            numbers = system.numbering.nodal[c.name][c.nodes]
-            mask = numbers >= 0
-            prescribed.append(PrescribedSeeds(numbers[mask], _one(int(mask.sum())), rates[mask]))
+            dofs = system.numbering.nodal[c.name][c.nodes]
+            mask = dofs >= 0
+            prescribed.append(PrescribedSeeds(dofs[mask], _one(int(mask.sum())), rates[mask]))
         return InputSeeds(prescribed=prescribed)
 
-    def put(self, statement: ProblemDefinition, value: Array) -> None:
+    def put(self, definition: ProblemDefinition, value: Array) -> None:
         """See `Input`."""
         for number in self.numbers:
-            condition = statement.conditions[number]
+            condition = definition.conditions[number]
             changed_value: Any = _changed(condition.value, float(value[0]))
-            statement.conditions[number] = replace(condition, value=changed_value)
+            definition.conditions[number] = replace(condition, value=changed_value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,13 +263,13 @@ class NodeCoordinates:
             if block.kernel.coordinates:
                 columns += self._of_nodes(block.name, block.nodes)
         element_blocks = {b.name: b for b in tape.problem.assembler.blocks}
-        statement = tape.system.statement
-        assert statement is not None
-        names = {*tape.system.blocks, *(f.label for f in statement.forces)}
+        definition = tape.system.definition
+        assert definition is not None
+        names = {*tape.system.blocks, *(f.label for f in definition.forces)}
         for name in element_blocks:
             if name not in names:
                 raise StudyError(f"by: places of nodes are not followed through {name!r}")
-        for force in statement.forces:
+        for force in definition.forces:
             if isinstance(force.kernel, Tie) and callable(force.kernel.offset):
                 raise StudyError(f"{force.label}: an offset that depends on places is not followed")
             if force.label in element_blocks and not isinstance(force.kernel, Spring | Tie):
@@ -279,12 +279,12 @@ class NodeCoordinates:
                 columns += [] if independent else self._of_nodes(force.label, force.nodes)
         return InputSeeds(columns, [*self._prescribed(tape)])
 
-    def put(self, statement: ProblemDefinition, value: Array) -> None:
+    def put(self, definition: ProblemDefinition, value: Array) -> None:
         """See `Input`."""
-        points, mask = statement.mesh.points.astype(np.float64), self.targets >= 0
+        points, mask = definition.mesh.points.astype(np.float64), self.targets >= 0
         moved = (value - self.base)[self.targets[mask]]
         points[mask] += moved[:, None] * self.directions[mask]
-        statement.mesh = replace(statement.mesh, points=points)
+        definition.mesh = replace(definition.mesh, points=points)
 
     def _of_nodes(self, name: str, nodes: Integers) -> Iterator[InputColumn]:
         for k in range(nodes.shape[1]):
@@ -300,8 +300,8 @@ class NodeCoordinates:
         for c in tape.system.conditions:
             if not callable(c.value):
                 continue
-            numbers = tape.system.numbering.nodal[c.name][c.nodes]
-            mask = numbers >= 0
+            dofs = tape.system.numbering.nodal[c.name][c.nodes]
+            mask = dofs >= 0
             nodes = c.nodes[mask]
             coordinates, along = self.mesh.points[nodes], wide * self.directions[nodes]
             rates = np.zeros(len(nodes))
@@ -311,14 +311,14 @@ class NodeCoordinates:
                     for s in (1, -1)
                 )
                 rates += weight / (60.0 * wide) * (ahead - backward)
-            yield PrescribedSeeds(numbers[mask], self.targets[nodes], rates)
+            yield PrescribedSeeds(dofs[mask], self.targets[nodes], rates)
 
 
 def varied_definition_of(
-    statement: ProblemDefinition, changes: Sequence[tuple[Input, Array]]
+    definition: ProblemDefinition, changes: Sequence[tuple[Input, Array]]
 ) -> ProblemDefinition:
-    """A copy of a statement with other values of inputs."""
-    changed = statement.copy()
+    """A copy of a definition with other values of inputs."""
+    changed = definition.copy()
     for item, value in changes:
         item.put(changed, value)
     return changed
@@ -344,7 +344,7 @@ def _changed(current: Any, value: float) -> float | Callable[..., Any]:
     return multiple
 
 
-def _amount(force: Force) -> str:
+def _amount(force: Load) -> str:
     if isinstance(force.kernel, Spring):
         return "stiffness"
     return "offset" if isinstance(force.kernel, Tie) else "value"

@@ -63,12 +63,12 @@ def _direct_jacobian(entries: Sequence[Entry], inputs: Sequence[Input], k: int) 
         for rates in along_path(chain, inputs):
             finished = [n for n, (tape, _) in waiting.items() if tape is rates.tape]
             for n in finished:
-                rows[n] = _row(waiting.pop(n)[1], rates.linear, rates.unknowns, rates.forces)
+                rows[n] = _row(waiting.pop(n)[1], rates.step, rates.unknowns, rates.forces)
     return rows
 
 
-def _row(quantity: Quantity, linear: LinearisedStep, unknowns: Array, forces: Array) -> Array:
-    slope, weights = quantity.slope(linear), quantity.weights(linear)
+def _row(quantity: Quantity, step: LinearisedStep, unknowns: Array, forces: Array) -> Array:
+    slope, weights = quantity.slope(step), quantity.weights(step)
     return np.asarray(slope @ unknowns + weights @ forces)
 
 

@@ -12,7 +12,7 @@ from scipy.sparse import csc_array
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.loads import Spring, Tie
-from softehl.runtime.sensitivity.element_derivatives import Elements
+from softehl.runtime.sensitivity.element_derivatives import ElementDerivatives
 from softehl.runtime.sensitivity.tape import Tape, WithoutMatrix
 from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.linear.linear_solver import Factorisation, Factors, SingularMatrix
@@ -30,7 +30,7 @@ class LinearisedStep:
         self.tape = tape
         self.fixed: Integers = tape.problem.fixed
         self.blocks = {
-            b.name: Elements(tape, b.name)
+            b.name: ElementDerivatives(tape, b.name)
             for b in tape.problem.assembler.blocks
             if b.name in tape.problem.parameters
         }

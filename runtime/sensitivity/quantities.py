@@ -25,11 +25,11 @@ class Quantity(Protocol):
         """The number."""
         ...
 
-    def slope(self, linear: LinearisedStep) -> Array:
+    def slope(self, step: LinearisedStep) -> Array:
         """Its derivative by all unknowns, (n,)."""
         ...
 
-    def weights(self, linear: LinearisedStep) -> Array:
+    def weights(self, step: LinearisedStep) -> Array:
         """Weights (n,) with which it counts the forces that make reactions, zero if it does not."""
         ...
 
@@ -45,9 +45,9 @@ class PointValue:
         """See `Quantity`."""
         return float(self._weights(tape.system) @ tape.x)
 
-    def slope(self, linear: LinearisedStep) -> Array:
+    def slope(self, step: LinearisedStep) -> Array:
         """See `Quantity`."""
-        return self._weights(linear.tape.system)
+        return self._weights(step.tape.system)
 
     def _weights(self, system: System) -> Array:
         """Weights (n,) of all unknowns."""
@@ -60,13 +60,13 @@ class PointValue:
             raise StudyError(
                 f"no {self.name} at {place_text(point)}; there are {join_names(by_unknown)}"
             )
-        numbers, weights = by_unknown[self.name]
-        np.add.at(weights_of_all, numbers, weights)
+        dofs, weights = by_unknown[self.name]
+        np.add.at(weights_of_all, dofs, weights)
         return weights_of_all
 
-    def weights(self, linear: LinearisedStep) -> Array:
+    def weights(self, step: LinearisedStep) -> Array:
         """See `Quantity`."""
-        return np.zeros(linear.tape.system.size)
+        return np.zeros(step.tape.system.size)
 
 
 @dataclass(frozen=True)
@@ -78,19 +78,19 @@ class ReactionSum:
 
     def value(self, tape: Tape) -> float:
         """See `Quantity`."""
-        linear = LinearisedStep(tape)
-        return float(self.weights(linear) @ linear.forces())
+        step = LinearisedStep(tape)
+        return float(self.weights(step) @ step.forces())
 
-    def slope(self, linear: LinearisedStep) -> Array:
+    def slope(self, step: LinearisedStep) -> Array:
         """See `Quantity`."""
-        return linear.by_unknowns(self.weights(linear))
+        return step.by_unknowns(self.weights(step))
 
-    def weights(self, linear: LinearisedStep) -> Array:
+    def weights(self, step: LinearisedStep) -> Array:
         """See `Quantity`."""
-        system = linear.tape.system
+        system = step.tape.system
         _require(self.name, system)
-        numbers, found = system.numbering.nodal[self.name], np.zeros(system.size)
-        side_dofs = numbers[system.mesh.nodes(self.side)]
+        dofs, found = system.numbering.nodal[self.name], np.zeros(system.size)
+        side_dofs = dofs[system.mesh.nodes(self.side)]
         found[side_dofs[side_dofs >= 0]] = 1.0
         return found
 
@@ -105,19 +105,19 @@ class UserQuantity:
         """See `Quantity`."""
         return float(self.function(tape.x)[0])
 
-    def slope(self, linear: LinearisedStep) -> Array:
+    def slope(self, step: LinearisedStep) -> Array:
         """See `Quantity`."""
-        gradient = np.asarray(self.function(linear.tape.x)[1], dtype=np.float64)
-        if gradient.shape != linear.tape.x.shape:
+        gradient = np.asarray(self.function(step.tape.x)[1], dtype=np.float64)
+        if gradient.shape != step.tape.x.shape:
             raise StudyError(
                 f"the gradient of a quantity has the shape {gradient.shape}, must be "
-                f"{linear.tape.x.shape}"
+                f"{step.tape.x.shape}"
             )
         return gradient
 
-    def weights(self, linear: LinearisedStep) -> Array:
+    def weights(self, step: LinearisedStep) -> Array:
         """See `Quantity`."""
-        return np.zeros(len(linear.tape.x))
+        return np.zeros(len(step.tape.x))
 
 
 def quantity(

@@ -78,9 +78,9 @@ class Tape:
             raise StudyError(
                 'derivatives need engine="serial": this result is of several processes'
             )
-        if system.statement is None or system.statement.count != system.written:
+        if system.definition is None or system.definition.size != system.definition_size:
             raise StudyError("the study was changed after this result: solve it again")
-        rubbing = any(contact.friction for contact in system.statement.contacts)
+        rubbing = any(contact.friction for contact in system.definition.contacts)
         if rubbing and not np.array_equal(self.step.old, system.at_rest()):
             raise StudyError(
                 "friction between bodies is not followed through several steps: derivatives need "
@@ -110,9 +110,9 @@ def depends_on_previous(system: System) -> bool:
 
 def continued_tape(system: System, start: Tape | None) -> Tape | None:
     """The path that goes on from a start: None where that is of another study."""
-    if start is None or start.system.statement is not system.statement:
+    if start is None or start.system.definition is not system.definition:
         return None
-    return start if start.system.written == system.written else None
+    return start if start.system.definition_size == system.definition_size else None
 
 
 def _at_rest(first: Tape) -> bool:
@@ -126,13 +126,13 @@ def _at_rest(first: Tape) -> bool:
 class TimeCoupling:
     """Data of a block that are values of steps before.
 
-    column: among coordinates, data and parameters. numbers: (n,) unknowns whose values they are.
+    column: among coordinates, data and parameters. dofs: (n,) unknowns whose values they are.
     weights: of the step before, of that before it.
     """
 
     block: str
     column: int
-    numbers: Integers
+    dofs: Integers
     weights: tuple[float, ...]
 
 
@@ -143,9 +143,9 @@ def time_couplings(tape: Tape) -> Iterator[TimeCoupling]:
         first = block.kernel.nodes * len(block.kernel.coordinates)
         for slots, weights in ((block.previous, (1.0,)), (block.rates, tape.step.weights)):
             for name, slot in slots.items():
-                numbers = nodal[slot.name][block.nodes[:, slot.node or 0]]
+                dofs = nodal[slot.name][block.nodes[:, slot.node or 0]]
                 column = first + block.kernel.data.index(name)
-                yield TimeCoupling(block.name, column, numbers, weights)
+                yield TimeCoupling(block.name, column, dofs, weights)
 
 
 def blocks_with_history(tape: Tape) -> list[str]:

@@ -11,7 +11,7 @@ import pytest
 
 from softehl import Mesh
 from softehl.runtime.arrays import Array
-from softehl.runtime.results.output import Picture
+from softehl.runtime.results.output import VtuFields
 
 SIZE = (2.0, 1.0, 3.0)
 FACES = {
@@ -46,7 +46,7 @@ def test_volumes_by_the_faces_of_vtk_are_positive(suffix: str, tmp_path: Path) -
         mesh = Mesh.box(SIZE, cells=(1, 2, 1), **given)
         path = tmp_path / f"{name}.vtu"
         if suffix == "result":
-            Picture(mesh.points, mesh.cells, {}, {}).write(path)
+            VtuFields(mesh.points, mesh.cells, {}, {}).write(path)
         elif name != "high":
             mesh.write(path := path.with_suffix(suffix))
             kind, nodes = next(iter(mesh.cells.items()))
