@@ -71,7 +71,7 @@ class Kernel(Family):
             Nodal coordinates of the elements.
         dofs : array (n, ndof)
             Unknowns of the elements.
-        **given : array
+        **kwargs : array
             Data and parameters; see the class.
 
         Returns
@@ -95,7 +95,7 @@ class Kernel(Family):
             Nodal coordinates of the elements.
         dofs : array (n, ndof)
             Unknowns of the elements.
-        **given : array
+        **kwargs : array
             Data and parameters; see the class.
 
         Returns
@@ -120,7 +120,7 @@ class Kernel(Family):
             Nodal coordinates of the elements.
         dofs : array (n, ndof)
             Unknowns of the elements.
-        **given : array
+        **kwargs : array
             Data and parameters; see the class.
 
         Returns
@@ -145,7 +145,7 @@ class Kernel(Family):
             Nodal coordinates of the elements.
         dofs : array (n, ndof)
             Unknowns of the elements.
-        **given : array
+        **kwargs : array
             Data and parameters; see the class.
 
         Returns
@@ -175,7 +175,7 @@ class Kernel(Family):
             Unknowns of the elements.
         direction : array (n, ndof)
             The vector.
-        **given : array
+        **kwargs : array
             Data and parameters; see the class.
 
         Returns
@@ -204,7 +204,7 @@ class Kernel(Family):
             Nodal coordinates of the elements.
         dofs : array (n, ndof)
             Unknowns of the elements.
-        **given : array
+        **kwargs : array
             Data and parameters; see the class.
 
         Returns
@@ -233,7 +233,7 @@ class Kernel(Family):
             Unknowns of the elements, which are held.
         direction : array (n, coordinates + data + parameters)
             Variation of each of these, in this order.
-        **given : array
+        **kwargs : array
             Data and parameters; see the class.
 
         Returns
@@ -264,7 +264,7 @@ class Kernel(Family):
             Unknowns of the elements.
         direction : array (n, coordinates + data + parameters + ndof)
             Variation of each of these, in this order.
-        **given : array
+        **kwargs : array
             Data and parameters; see the class.
 
         Returns
@@ -291,7 +291,7 @@ class Kernel(Family):
             Nodal coordinates of the elements.
         dofs : array (n, ndof)
             Unknowns of the elements.
-        **given : array
+        **kwargs : array
             Data and parameters; see the class.
 
         Returns

@@ -477,7 +477,7 @@ class Mesh:
 
         Parameters
         ----------
-        words : str
+        context : str
             The call, for the message.
 
         Raises
