@@ -9,7 +9,7 @@ from softehl.codegen.derive.linear_interfaces import LinearInterface
 from softehl.codegen.derive.multilevel_chain_rule import Linearisation
 from softehl.codegen.derive.output_entries import Entry, Slot
 from softehl.codegen.derive.potential_structure import Structure
-from softehl.codegen.graph.differentiation import Given, gradient
+from softehl.codegen.graph.differentiation import PrescribedDerivatives, gradient
 from softehl.codegen.graph.graph import FREE, Graph, Node
 from softehl.codegen.graph.guarded_products import Certain
 from softehl.codegen.graph.traversal import reachable
@@ -60,7 +60,7 @@ class Modal:
     d: Definition
     s: Structure
     upper: tuple[tuple[Node, ...], ...]
-    derivatives: Given = field(default_factory=dict)
+    derivatives: PrescribedDerivatives = field(default_factory=dict)
 
     def _adjoint(self) -> dict[Node, Node]:
         return gradient(

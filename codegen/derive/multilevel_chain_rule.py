@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from softehl.codegen.graph.differentiation import Dependence, Given
+from softehl.codegen.graph.differentiation import Dependence, PrescribedDerivatives
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.guarded_products import Certain, guarded, plus, shielded
 from softehl.codegen.graph.length_derivatives import square_of
@@ -35,7 +35,7 @@ class Linearisation:
     interface: Collection[Node] = ()
     symmetric: Mapping[Node, Node] = field(default_factory=dict)
     constant: Collection[Node] = ()
-    prescribed: Given = field(default_factory=dict)
+    prescribed: PrescribedDerivatives = field(default_factory=dict)
     upper: Sequence[Collection[Node]] = ()
     gates: Mapping[Node, int] = field(default_factory=dict)
     certain: Certain = field(default_factory=Certain)

@@ -19,7 +19,7 @@ from softehl.codegen.graph.length_derivatives import by_square, slope, square_of
 from softehl.codegen.graph.partial_derivatives import Partials, partials
 from softehl.codegen.graph.traversal import reachable
 
-Given = Mapping[Node, Mapping[Node, Node]]
+PrescribedDerivatives = Mapping[Node, Mapping[Node, Node]]
 """Derivatives that a page gives: of a node with respect to others."""
 
 
@@ -29,7 +29,7 @@ class Dependence:
 
     sources: Collection[Node]
     constant: Collection[Node] = ()
-    prescribed: Given = field(default_factory=dict)
+    prescribed: PrescribedDerivatives = field(default_factory=dict)
     _memo: dict[Node, bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -59,7 +59,7 @@ def gradient(
     wrt: Sequence[Node],
     *,
     constant: Collection[Node] = (),
-    prescribed: Given | None = None,
+    prescribed: PrescribedDerivatives | None = None,
     named: Collection[Node] = (),
     flat: bool = False,
 ) -> dict[Node, Node]:
@@ -174,7 +174,10 @@ class _Reverse:
 
 
 def directional(
-    g: Graph, roots: Sequence[Node], seeds: Mapping[Node, Node], prescribed: Given | None = None
+    g: Graph,
+    roots: Sequence[Node],
+    seeds: Mapping[Node, Node],
+    prescribed: PrescribedDerivatives | None = None,
 ) -> list[Node]:
     """Derivatives of `roots` when each key of `seeds` moves at the rate of its value (forward)."""
     depends = Dependence(tuple(seeds), (), prescribed or {})

@@ -74,12 +74,12 @@ def named(
     """Lines of a deck with at most 8 values, their names before them."""
     if not arguments:
         return ["0.0"]
-    known, lines = dict(example), []
+    by_name, lines = dict(example), []
     pairs = list(zip((a.name for a in arguments), values, strict=True))
     for k in range(0, len(pairs), 8):
         row = pairs[k : k + 8]
         lines.append(f"** give your values: {', '.join(name for name, _ in row)}")
-        lines.append(", ".join(repr(float(known.get(name, v))) for name, v in row))
+        lines.append(", ".join(repr(float(by_name.get(name, v))) for name, v in row))
     return lines
 
 

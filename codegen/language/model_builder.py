@@ -149,7 +149,7 @@ class Arguments:
     def rates(self, names: Sequence[str], order: int) -> list[list[sp.Expr]]:
         """Time derivatives of nodal unknowns: coefficient times unknown plus data."""
         coefficient, suffix = self.of_time(order)
-        found = []
+        result = []
         for name in names:
             count = sum(n == name and a is not None for n, a in self.dof_nodes)
             if not count:
@@ -159,8 +159,8 @@ class Arguments:
             if name in self._idle:
                 for unused in (str(coefficient), *map(str, offset)):
                     self._declared.pop(unused, None)
-            found.append([coefficient * u + v for u, v in zip(values, offset, strict=True)])
-        return found
+            result.append([coefficient * u + v for u, v in zip(values, offset, strict=True)])
+        return result
 
     def of_time(self, order: int) -> tuple[sp.Symbol, str]:
         """Coefficient of a time derivative, and what the names of its data end in."""
@@ -368,7 +368,7 @@ class Intermediates:
         local = root.varying and not all(s.varying for s in sources)
         if local and any(n.op is Op.SUM for n in reachable([root], stop=sources.__contains__)):
             raise ModelError(f"{name}: {value} depends on an integral; give it a name of its own")
-        slopes = gradient(
+        by_source = gradient(
             self._symbols.graph, root, sources, prescribed=self.prescribed, flat=local
         )
         below = [value, *symbols.values]
@@ -376,7 +376,7 @@ class Intermediates:
         times = [sources.count(s) if matrix else 1 for s in sources]
         graph = self._symbols.graph
         parts = [
-            graph.mul(graph.const(Fraction(1, n)), slopes[s])
+            graph.mul(graph.const(Fraction(1, n)), by_source[s])
             for s, n in zip(sources, times, strict=True)
         ]
         derivatives = self._symbols.named(name, symbols, parts, below)

@@ -74,20 +74,22 @@ def intact(directory: Path) -> bool:
     """True if the library there is whole and was built from the sources there; never loads it."""
     try:
         data = (directory / LIBRARY).read_bytes()
-        told = (directory / DIGEST).read_text(encoding="ascii").split()
-        return told[:1] == [_sha256(data)] and signature(directory).encode() in data
+        recorded = (directory / DIGEST).read_text(encoding="ascii").split()
+        return recorded[:1] == [_sha256(data)] and signature(directory).encode() in data
     except (OSError, UnicodeDecodeError):
         return False
 
 
 def compiler() -> list[str]:
     """The C compiler as a command: $CC, or cc from the PATH."""
-    given = os.environ.get("CC", "")
+    command = os.environ.get("CC", "")
     try:
-        return shlex.split(given) or ["cc"]
+        return shlex.split(command) or ["cc"]
     except ValueError as error:
         reason = str(error)[:1].lower() + str(error)[1:]
-        raise BuildError(f"CC={given!r} is no command ({reason}): set CC to a C compiler") from None
+        raise BuildError(
+            f"CC={command!r} is no command ({reason}): set CC to a C compiler"
+        ) from None
 
 
 def lighter(source: Path, text: str) -> tuple[str, ...]:
@@ -123,11 +125,11 @@ def build(
             start = perf_counter()
             text = source.read_text(encoding="utf-8")
             lanes = [] if wide is None or source.stem in wide else ["-DSOFTEHL_LANES=1"]
-            words = [*compiling, *lighter(source, text), *lanes, *extra]
+            arguments = [*compiling, *lighter(source, text), *lanes, *extra]
             if source.name.startswith(SHARED):
-                shutil.copyfile(_shared(source, text, words, flags), to)
+                shutil.copyfile(_shared(source, text, arguments, flags), to)
             else:
-                _run([*words, define, "-c", str(source), "-o", str(to)], to)
+                _run([*arguments, define, "-c", str(source), "-o", str(to)], to)
             return perf_counter() - start
 
         with ThreadPoolExecutor(_processors()) as pool:
@@ -151,8 +153,8 @@ def _shared(source: Path, text: str, command: Sequence[str], flags: Sequence[str
 
     It knows of the header only what is the same in all of them.
     """
-    told = (text, c_runtime.TEXT, str(VERSION), shlex.join(command), identification(flags))
-    key = cache_store.digest("shared", *told)
+    inputs = (text, c_runtime.TEXT, str(VERSION), shlex.join(command), identification(flags))
+    key = cache_store.digest("shared", *inputs)
 
     def complete(folder: Path) -> bool:
         data = (folder / _OBJECT).read_bytes()
@@ -184,10 +186,10 @@ def identification(flags: Sequence[str] = FLAGS) -> str:
     command = [*compiler(), *(f for f in flags if f != "-shared"), "-dM", "-E", "-x", "c", "-"]
     done = _called(command)
     if done.returncode != 0 or "#define __STDC__" not in done.stdout:
-        words = " ".join((done.stderr or done.stdout).split())[:200] or "nothing"
+        message = " ".join((done.stderr or done.stdout).split())[:200] or "nothing"
         raise BuildError(
             f"{shlex.join(compiler())} does not answer as a C compiler does "
-            f"(exit code {done.returncode}: {words}): set CC to one"
+            f"(exit code {done.returncode}: {message}): set CC to one"
         )
     return shlex.join([*compiler(), *flags]) + "\n" + done.stdout
 

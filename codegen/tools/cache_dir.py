@@ -35,9 +35,9 @@ def root() -> Path:
 
 def writable() -> Path:
     """The cache folder, created.  Raises `CacheError` where it is not safe or not writable."""
-    folder = wanted()
+    folder = configured()
     try:
-        own(folder)
+        require_own(folder)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError as error:
@@ -45,7 +45,7 @@ def writable() -> Path:
         raise CacheError(f"the cache {folder} cannot be written ({reason}): {_REMEDY}") from None
 
 
-def own(folder: Path) -> Path:
+def require_own(folder: Path) -> Path:
     """Create a folder that only this user may write to.  Raises `CacheError` if it is another."""
     folder.mkdir(mode=0o755, parents=True, exist_ok=True)
     reason = fault(folder)
@@ -66,12 +66,12 @@ def fault(folder: Path) -> str:
     return ""
 
 
-def wanted() -> Path:
+def configured() -> Path:
     """Wanted place of the cache.  Raises `CacheError` where there is no home folder."""
-    chosen = os.environ.get("SOFTEHL_CACHE")
+    variable = os.environ.get("SOFTEHL_CACHE")
     try:
-        if chosen:
-            return Path(chosen).expanduser().absolute()
+        if variable:
+            return Path(variable).expanduser().absolute()
         if sys.platform == "darwin":
             return Path.home() / "Library" / "Caches" / "softehl"
         base = os.environ.get("XDG_CACHE_HOME")

@@ -68,7 +68,7 @@ def recall(key: str) -> dict[str, str] | None:
             return None
         stored = json.loads((derived / f"{key}.json").read_text(encoding="utf-8"))
         files: dict[str, str] = stored["files"]
-        current = all(digest_of(path) == told for path, told in stored["read"].items())
+        current = all(digest_of(path) == digest for path, digest in stored["read"].items())
         return files if current and stored["content"] == content(files) else None
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
@@ -126,36 +126,36 @@ def folder(
     keep: raise `CacheError` where the cache cannot be used, instead of taking a temporary folder.
     """
 
-    def usable(place: Path) -> bool:
+    def usable(candidate: Path) -> bool:
         try:
-            return not cache_dir.fault(place) and complete(place)
+            return not cache_dir.fault(candidate) and complete(candidate)
         except OSError:
             return False
 
-    found = _found(key, usable)
-    if found is not None:
-        return found
+    existing = _existing(key, usable)
+    if existing is not None:
+        return existing
     built = own((writable() if keep else root()) / "built")
-    place = built / key
+    target = built / key
     with _alone(built / f".lock-{key}"):
-        if not usable(place):
+        if not usable(target):
             with _scratch(built) as scratch:
                 make(scratch)
                 _synchronise(scratch)
-                _publish(scratch, place, usable)
+                _publish(scratch, target, usable)
                 _synchronise(built)
-    return place
+    return target
 
 
-def _found(key: str, usable: Callable[[Path], bool]) -> Path | None:
+def _existing(key: str, usable: Callable[[Path], bool]) -> Path | None:
     """The folder of a key in a cache that need not be writable."""
     try:
         built = cache_dir.wanted() / "built"
         safe = not any(map(cache_dir.fault, (built.parent, built)))
     except (CacheError, OSError):
         return None
-    place = built / key
-    return place if safe and usable(place) else None
+    candidate = built / key
+    return candidate if safe and usable(candidate) else None
 
 
 @contextmanager
@@ -192,22 +192,22 @@ def _synchronise(folder: Path) -> None:
             os.close(handle)
 
 
-def _publish(scratch: Path, place: Path, complete: Callable[[Path], bool]) -> None:
+def _publish(scratch: Path, target: Path, complete: Callable[[Path], bool]) -> None:
     """Move a finished folder to its place, unless another process was first."""
     while True:
         try:
-            os.rename(scratch, place)
+            os.rename(scratch, target)
             return
         except OSError:
-            if not place.exists():
+            if not target.exists():
                 raise
-        if complete(place):
+        if complete(target):
             return
-        damaged = Path(tempfile.mkdtemp(prefix=_SCRATCH, dir=place.parent))
+        damaged = Path(tempfile.mkdtemp(prefix=_SCRATCH, dir=target.parent))
         with suppress(OSError):  # a folder that may not be written cannot be moved
-            place.chmod(0o700)
+            target.chmod(0o700)
         with suppress(FileNotFoundError):  # another process has set it aside already
-            os.rename(place, damaged / place.name)
+            os.rename(target, damaged / target.name)
         shutil.rmtree(damaged, ignore_errors=True)
 
 

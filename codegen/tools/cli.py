@@ -74,8 +74,8 @@ def generate(
 
 def _materials(models: Sequence[Path], on: On) -> bool:
     """True for files of materials alone: target ufcx writes them otherwise than elements."""
-    found = [] if on.cells else [d for path in models for d in model_loader.pages(path, on)]
-    return bool(found) and all(isinstance(d, Law) for d in found)
+    pages = [] if on.cells else [d for path in models for d in model_loader.pages(path, on)]
+    return bool(pages) and all(isinstance(d, Law) for d in pages)
 
 
 def _require_printable(*paths: Path) -> None:
@@ -126,16 +126,16 @@ def _regenerate(check: bool) -> int:
     files = output_files.files(pipeline.compile_model(make()) for make in ALL.values())
     files[cell_table.NAME] = cell_table.cell_table()
     stale = [name for name, text in files.items() if _differs(GENERATED / name, text)]
-    known = {*files, "__init__.py"}
-    strange = [p.name for p in GENERATED.glob("*.[chj]*") if p.name not in known]
+    expected = {*files, "__init__.py"}
+    unexpected = [p.name for p in GENERATED.glob("*.[chj]*") if p.name not in expected]
     if check:
-        for name in stale + strange:
+        for name in stale + unexpected:
             print(f"stale: generated/{name}", file=sys.stderr)
-        if stale or strange:
+        if stale or unexpected:
             print("mend it with: softehl generate", file=sys.stderr)
-        return 1 if stale or strange else 0
+        return 1 if stale or unexpected else 0
     GENERATED.mkdir(exist_ok=True)
-    for name in strange:
+    for name in unexpected:
         (GENERATED / name).unlink()
     for name in stale:
         cache_store.write(GENERATED / name, files[name].encode())

@@ -77,11 +77,13 @@ def _states(d: Definition) -> list[State]:
 def write(folder: Path, texts: Mapping[str, str]) -> None:
     """Write files; raises `ModelFileError` for a folder that holds files of somebody else."""
     notes = folder / NOTES
-    ours = notes.is_file() and MARK in notes.read_text(encoding="utf-8", errors="replace")
-    strange = [p.name for p in sorted(folder.glob("*"))] if folder.is_dir() and not ours else []
-    if strange:
+    generated = notes.is_file() and MARK in notes.read_text(encoding="utf-8", errors="replace")
+    foreign = (
+        [p.name for p in sorted(folder.glob("*"))] if folder.is_dir() and not generated else []
+    )
+    if foreign:
         raise ModelFileError(
-            f"{folder} holds {', '.join(strange[:3])}, which softehl did not write; give another "
+            f"{folder} holds {', '.join(foreign[:3])}, which softehl did not write; give another "
             "--out"
         )
     folder.mkdir(parents=True, exist_ok=True)

@@ -42,21 +42,21 @@ class Inputs:
     digests: dict[str, str] = field(default_factory=dict)
     foreign: set[str] = field(default_factory=set)
 
-    def beyond(self, path: Path, known: Mapping[str, str]) -> dict[str, str] | None:
+    def beyond(self, path: Path, sources: Mapping[str, str]) -> dict[str, str] | None:
         """Digests of what was read beside the `model_text.sources` of a file as they were known.
 
         None where that does not say it all: a file was edited between its digest and its run, or a
         module came from elsewhere.
         """
         folder = path.resolve().parent
-        found = {p: d for p, d in self.digests.items() if Path(p).resolve() not in self.texts}
+        others = {p: d for p, d in self.digests.items() if Path(p).resolve() not in self.texts}
         for file, text in self.texts.items():
             name = file.relative_to(folder).as_posix()
-            if name not in known:
-                found[str(file)] = hashlib.sha256(text.encode()).hexdigest()
-            elif known[name] != text:
+            if name not in sources:
+                others[str(file)] = hashlib.sha256(text.encode()).hexdigest()
+            elif sources[name] != text:
                 return None
-        return None if self.foreign else found
+        return None if self.foreign else others
 
 
 _ONE = threading.RLock()
@@ -74,8 +74,8 @@ def imports_from(folder: Path) -> Iterator[Inputs]:
 def _isolated(folder: Path) -> Iterator[Inputs]:
     inputs, finder = Inputs(), _Finder(folder)
     finder.inputs = inputs
-    before = _modules_in(folder, finder)
-    for name in before:
+    previous = _modules_in(folder, finder)
+    for name in previous:
         del sys.modules[name]
     others, writing = dict(sys.modules), sys.dont_write_bytecode
     sys.path.insert(0, str(folder))
@@ -93,7 +93,7 @@ def _isolated(folder: Path) -> Iterator[Inputs]:
         for name in _modules_in(folder, finder):
             if name not in others:
                 _leave(name)
-        for name, module in before.items():
+        for name, module in previous.items():
             _put(name, module)
 
 
@@ -120,12 +120,12 @@ def _modules_in(folder: Path, finder: _Finder) -> dict[str, ModuleType]:
             return False
         if top not in tops:
             tops[top] = finder.file(top, None) is not None
-        return tops[top] or any(_inside(place, folder) for place in _places(module))
+        return tops[top] or any(_inside(path, folder) for path in _paths_of(module))
 
     return {name: module for name, module in list(sys.modules.items()) if of_folder(name, module)}
 
 
-def _places(module: ModuleType) -> list[Path]:
+def _paths_of(module: ModuleType) -> list[Path]:
     """File of a module and folders of a package."""
     file = getattr(module, "__file__", None)
     with suppress(Exception):  # a package may have anything as its path
@@ -141,9 +141,12 @@ def _inside(path: Path, folder: Path) -> bool:
 @cache
 def _system() -> tuple[Path, ...]:
     """Folders of Python and of softehl itself."""
-    ours = [_SOFTEHL, *(_SOFTEHL / room for room in ("codegen", "runtime", "generated", "cases"))]
+    packages = [
+        _SOFTEHL,
+        *(_SOFTEHL / room for room in ("codegen", "runtime", "generated", "cases")),
+    ]
     paths = [Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib")]
-    return tuple(path.resolve() for path in [*paths, *ours])
+    return tuple(path.resolve() for path in [*paths, *packages])
 
 
 def installed(path: Path) -> bool:
@@ -156,13 +159,15 @@ def installed(path: Path) -> bool:
     return any(path.is_relative_to(folder) for folder in _system())
 
 
-def _foreign(folder: Path, texts: dict[Path, str], before: dict[str, ModuleType]) -> Iterator[str]:
+def _foreign(
+    folder: Path, texts: dict[Path, str], previous: dict[str, ModuleType]
+) -> Iterator[str]:
     """Modules that these texts import and that the process had from elsewhere, not installed."""
     names = {n for file, text in texts.items() for n in model_text.imported(folder, file, text)}
     for name in names:
         parts = name.split(".")
         for k in range(1, len(parts) + 1):
-            module = before.get(".".join(parts[:k]))
+            module = previous.get(".".join(parts[:k]))
             if module is not None and parts[0] != "softehl" and not _fixed(module):
                 yield ".".join(parts[:k])
 
@@ -259,23 +264,23 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
         return
     path, mode, flags = arguments
     writes = mode[0] in "wax" if mode else flags & os.O_ACCMODE == os.O_WRONLY
-    here = [inputs for thread, inputs in _recording if thread == threading.get_ident()]
-    if here and not writes and isinstance(path, (str, bytes, os.PathLike)):
+    active = [inputs for thread, inputs in _recording if thread == threading.get_ident()]
+    if active and not writes and isinstance(path, (str, bytes, os.PathLike)):
         with suppress(OSError, ValueError):
-            _note(os.fsdecode(path), here)
+            _note(os.fsdecode(path), active)
 
 
-def _note(path: str, here: list[Inputs]) -> None:
+def _note(path: str, active: list[Inputs]) -> None:
     if path.endswith(".pyc"):
         path = source_from_cache(path)
     file = Path(path).resolve()
     if installed(file) or not file.is_file() or file.is_relative_to("/proc"):
         return
-    mine = _recording[:]
+    recording = _recording[:]
     _recording.clear()  # reading it here is no reading of the model
     try:
-        found = model_text.digest_of(path)
+        digest = model_text.digest_of(path)
     finally:
-        _recording[:] = mine
-    for inputs in here:
-        inputs.digests.setdefault(path, found)
+        _recording[:] = recording
+    for inputs in active:
+        inputs.digests.setdefault(path, digest)

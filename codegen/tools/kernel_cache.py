@@ -67,19 +67,19 @@ def folder_of(
         return _for_derivatives(source, where)
     if not isinstance(source, Path):
         return library(_definitions(source, where)).folder
-    known = model_text.sources(source)
-    anywhere = _file_key(known)
-    here = _file_key(known, *cells, geometry, "materials" if materials else "")
+    sources = model_text.sources(source)
+    anywhere = _file_key(sources)
+    here = _file_key(sources, *cells, geometry, "materials" if materials else "")
     files = (None if materials else store.recall(anywhere)) or store.recall(here)
     if files is None:
         from softehl.codegen.language.weak_form import On
         from softehl.codegen.tools import model_loader
 
         on = On(cells, geometry or None, materials)
-        found, inputs = model_loader.definitions_and_inputs(source, on)
-        read = inputs.beyond(source, known)
-        key = None if read is None else here if any(d.cell for d in found) else anywhere
-        return library(found, key, read).folder
+        definitions, inputs = model_loader.definitions_and_inputs(source, on)
+        read = inputs.beyond(source, sources)
+        key = None if read is None else here if any(d.cell for d in definitions) else anywhere
+        return library(definitions, key, read).folder
     return compiled(files)[0]
 
 
@@ -88,9 +88,9 @@ def _for_derivatives(source: Path | Definition | Page | Law, where: Where) -> Pa
     cells, geometry, materials = where
     key, read = None, None
     if isinstance(source, Path):
-        told = geometry, "materials" if materials else "", "derivatives"
-        known = model_text.sources(source)
-        key = _file_key(known, *cells, *told)
+        options = geometry, "materials" if materials else "", "derivatives"
+        sources = model_text.sources(source)
+        key = _file_key(sources, *cells, *options)
         files = store.recall(key)
         if files is not None:
             return compiled(files)[0]
@@ -98,14 +98,14 @@ def _for_derivatives(source: Path | Definition | Page | Law, where: Where) -> Pa
         from softehl.codegen.tools import model_loader
 
         on = On(cells, geometry or None, materials)
-        found, inputs = model_loader.definitions_and_inputs(source, on)
-        read = inputs.beyond(source, known)
+        definitions, inputs = model_loader.definitions_and_inputs(source, on)
+        read = inputs.beyond(source, sources)
         key = None if read is None else key
     else:
-        found = _definitions(source, where)
-    free = [d for d in found if not d.prescribed]
+        definitions = _definitions(source, where)
+    free = [d for d in definitions if not d.prescribed]
     if not free:
-        names = ", ".join(d.name for d in found)
+        names = ", ".join(d.name for d in definitions)
         raise ModelFileError(f"{names}: gives derivatives of its own, and results have none by it")
     return library([d.for_derivatives() for d in free], key, read).folder
 
@@ -119,8 +119,8 @@ def of_law(name: str, where: Where, *, derivatives: bool = False) -> Path:
         return compiled(files)[0]
     from softehl.codegen.models.material_elements import law
 
-    found = _definitions(law(name), where)
-    return library([d.for_derivatives() if derivatives else d for d in found], key).folder
+    definitions = _definitions(law(name), where)
+    return library([d.for_derivatives() if derivatives else d for d in definitions], key).folder
 
 
 def _definitions(source: Definition | Page | Law, where: Where) -> list[Definition]:
@@ -143,14 +143,14 @@ def of_files(paths: Sequence[Path], on: On | None = None) -> tuple[list[Definiti
     from softehl.codegen.tools import model_loader
 
     on = on or NOWHERE
-    known = [model_text.sources(p) for p in paths]
+    sources = [model_text.sources(p) for p in paths]
     runs = [model_loader.definitions_and_inputs(p, on) for p in paths]
     found = [d for definitions, _ in runs for d in definitions]
     model_loader.check_names(" ".join(p.name for p in paths), found)
     if len(paths) > 1:
         return found, library(found, check=False)
-    read = runs[0][1].beyond(paths[0], known[0])
-    key = None if read is None else _file_key(known[0], *on.options())
+    read = runs[0][1].beyond(paths[0], sources[0])
+    key = None if read is None else _file_key(sources[0], *on.options())
     return found, library(found, key, read, check=False)
 
 
@@ -219,8 +219,8 @@ def compiled(files: Mapping[str, str], *, keep: bool = False) -> tuple[Path, dic
     keep: as in `cache.folder`.
     """
     content = store.content(files)
-    flags, told = build.tuned()
-    key = store.digest(content, str(abi.VERSION), told)
+    flags, compiler = build.tuned()
+    key = store.digest(content, str(abi.VERSION), compiler)
     seconds: dict[str, float] = {}
 
     def complete(folder: Path) -> bool:
@@ -257,44 +257,44 @@ def generator() -> str:
 
 def fingerprint(definition: Definition) -> str:
     """Digest of everything that a definition says, its graphs included."""
-    return store.digest(_told(definition), _told(definition.point))
+    return store.digest(_canonical_text(definition), _canonical_text(definition.point))
 
 
-def _told(value: Any) -> str:
+def _canonical_text(value: Any) -> str:
     """A record as text: its nodes, numbered from operands to users, then its entries."""
     from softehl.codegen.graph.graph import Routine
     from softehl.codegen.graph.traversal import reachable
 
     roots: list[Node] = []
     _entries(value, lambda n: roots.append(n) or "")  # type: ignore[func-returns-value]
-    place = {n: f"#{k}" for k, n in enumerate(reachable(roots))}
+    numbers = {n: f"#{k}" for k, n in enumerate(reachable(roots))}
     lines = []
-    for n in place:
-        payload = _told(n.payload) if isinstance(n.payload, Routine) else repr(n.payload)
-        lines.append(f"{n.op} {[place[a] for a in n.args]} {payload} {n.varying}")
-    return "\n".join([*lines, _entries(value, place.__getitem__)])
+    for n in numbers:
+        payload = _canonical_text(n.payload) if isinstance(n.payload, Routine) else repr(n.payload)
+        lines.append(f"{n.op} {[numbers[a] for a in n.args]} {payload} {n.varying}")
+    return "\n".join([*lines, _entries(value, numbers.__getitem__)])
 
 
 def _counts(f: Field[Any]) -> bool:
     return f.compare and f.name[0] != "_"
 
 
-def _entries(value: Any, shown: Callable[[Node], str]) -> str:
-    """A value as text, nodes as `shown`.
+def _entries(value: Any, label: Callable[[Node], str]) -> str:
+    """A value as text, nodes as `label`.
 
     Fields that a record keeps for itself (_name) or does not compare are left out.
     """
     from softehl.codegen.graph.graph import Graph, Node
 
     if isinstance(value, Node):
-        return shown(value)
+        return label(value)
     if isinstance(value, Mapping):
-        inside = [f"{_entries(k, shown)}: {_entries(v, shown)}" for k, v in value.items()]
+        inside = [f"{_entries(k, label)}: {_entries(v, label)}" for k, v in value.items()]
     elif isinstance(value, (tuple, list)):
-        inside = [_entries(v, shown) for v in value]
+        inside = [_entries(v, label) for v in value]
     elif is_dataclass(value):
         named = {f.name: getattr(value, f.name) for f in fields(value) if _counts(f)}
-        inside = [type(value).__name__, _entries(named, shown)]
+        inside = [type(value).__name__, _entries(named, label)]
     else:
         return "" if isinstance(value, Graph) else repr(value)
     return f"({', '.join(inside)})"

@@ -66,16 +66,18 @@ def definitions(path: Path, on: On = NOWHERE) -> list[Definition]:
 
 def definitions_and_inputs(path: Path, on: On = NOWHERE) -> tuple[list[Definition], Inputs]:
     """As `definitions`, with what the run has read."""
-    found, inputs = _found(path, on, by_itself=False)
-    return [d for d in found if isinstance(d, Definition)], inputs
+    definitions, inputs = _pages_and_inputs(path, on, by_itself=False)
+    return [d for d in definitions if isinstance(d, Definition)], inputs
 
 
 def pages(path: Path, on: On = NOWHERE) -> list[Definition | Law]:
     """The models and the materials of a file, which is run; raises `ModelFileError`."""
-    return _found(path, on, by_itself=True)[0]
+    return _pages_and_inputs(path, on, by_itself=True)[0]
 
 
-def _found(path: Path, on: On, *, by_itself: bool) -> tuple[list[Definition | Law], Inputs]:
+def _pages_and_inputs(
+    path: Path, on: On, *, by_itself: bool
+) -> tuple[list[Definition | Law], Inputs]:
     """Models, with materials by themselves or as bodies where there is nothing else."""
     path = path.resolve()
     text = read(path)
@@ -94,11 +96,11 @@ def _found(path: Path, on: On, *, by_itself: bool) -> tuple[list[Definition | La
             )
         if not by_itself:
             entries = others if others and not on.materials else [law.page() for law in laws]
-        found = _all_made(entries, on)
-    if not found:
+        pages = _make_all(entries, on)
+    if not pages:
         raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
-    check_names(path.name, found)
-    return found, inputs
+    check_names(path.name, pages)
+    return pages, inputs
 
 
 def written_out(path: Path, seconds: float = math.inf, on: On = NOWHERE) -> dict[str, Definition]:
@@ -122,7 +124,7 @@ class _Over(BaseException):
 @contextmanager
 def _at_most(seconds: float) -> Iterator[None]:
     """End what takes longer, at its next call of a function: SymPy may look at a tree for hours."""
-    deadline, before = perf_counter() + seconds, sys.getprofile()
+    deadline, previous = perf_counter() + seconds, sys.getprofile()
 
     def watch(*_: Any) -> None:
         if perf_counter() > deadline:
@@ -132,13 +134,13 @@ def _at_most(seconds: float) -> Iterator[None]:
     try:
         yield
     finally:
-        sys.setprofile(before)
+        sys.setprofile(previous)
 
 
-def check_names(where: str, found: Iterable[Definition | Law]) -> None:
+def check_names(where: str, models: Iterable[Definition | Law]) -> None:
     """Raise `ModelFileError` unless the names are different."""
     seen: set[str] = set()
-    for d in found:
+    for d in models:
         if d.name in seen:
             raise ModelFileError(f"{where}: two models are called {d.name}; rename one")
         seen.add(d.name)
@@ -156,19 +158,19 @@ def _run(path: Path, text: str, inputs: Inputs) -> ModuleType:
 
 
 def _entries(path: Path, module: ModuleType) -> list[Any]:
-    chosen = getattr(module, "MODELS", None)
-    if chosen is not None:
-        return list(chosen.values() if isinstance(chosen, Mapping) else chosen)
+    listed_models = getattr(module, "MODELS", None)
+    if listed_models is not None:
+        return list(listed_models.values() if isinstance(listed_models, Mapping) else listed_models)
     public = [(k, v) for k, v in vars(module).items() if not k.startswith("_")]
     kinds = Definition | Page | Law
-    found = [v for _, v in public if isinstance(v, kinds) or _makes_a_model(module, v)]
-    if not found:
+    entries = [v for _, v in public if isinstance(v, kinds) or _makes_a_model(module, v)]
+    if not entries:
         bare = [k for k, v in public if _own_function(module, v) and _annotation(v) is None]
         if bare:
             raise ModelFileError(
                 f"{path.name} has no model: annotate `def {bare[0]}() -> Definition:` if it is one"
             )
-    return found
+    return entries
 
 
 def _own_function(module: ModuleType, value: Any) -> bool:
@@ -192,18 +194,18 @@ def _makes_a_model(module: ModuleType, value: Any) -> bool:
     return annotation is Definition
 
 
-def _all_made(entries: Iterable[Any], on: On) -> list[Definition | Law]:
+def _make_all(entries: Iterable[Any], on: On) -> list[Definition | Law]:
     """All models that stand there.  Raises Elsewhere where none of the pages does."""
-    found: list[Definition | Law] = []
+    made: list[Definition | Law] = []
     refused: list[Elsewhere] = []
     for entry in entries:
         try:
-            found += _made(entry, on)
+            made += _made(entry, on)
         except Elsewhere as error:
             refused.append(error)
-    if refused and not found:
+    if refused and not made:
         raise refused[0]
-    return found
+    return made
 
 
 def _made(entry: Any, on: On) -> list[Definition | Law]:
@@ -257,9 +259,9 @@ def _errors_of(path: Path) -> Iterator[None]:
             what += " (m.grad(u) has as many columns as the mesh has dimensions; "
             what += "m.deformation_gradient(u) is 3 x 3)"
         if isinstance(error, TypeError) and _NUMERIC.search(what):
-            found = _FUNCTION.search(written)
-            use = f"sp.{_IN_SYMPY.get(found[2], found[2])}" if found else "those of sympy"
-            called = found[0] if found else "a function of math or NumPy"
+            function = _FUNCTION.search(written)
+            use = f"sp.{_IN_SYMPY.get(function[2], function[2])}" if function else "those of sympy"
+            called = function[0] if function else "a function of math or NumPy"
             kind, what = "", f"{called} computes with numbers, not with symbols: use {use}"
         raise ModelFileError(f"{where}: {kind}{what}") from error
 
@@ -267,7 +269,7 @@ def _errors_of(path: Path) -> Iterator[None]:
 def _line(path: Path, error: BaseException) -> tuple[str, str]:
     """File and line of the innermost frame that stands in the model's folder, and its text."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [f for f in frames if Path(f.filename).is_relative_to(path.parent)]
-    if not own:
+    in_folder = [f for f in frames if Path(f.filename).is_relative_to(path.parent)]
+    if not in_folder:
         return path.name, ""
-    return f"{Path(own[-1].filename).name}:{own[-1].lineno}", own[-1].line or ""
+    return f"{Path(in_folder[-1].filename).name}:{in_folder[-1].lineno}", in_folder[-1].line or ""

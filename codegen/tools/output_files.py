@@ -68,7 +68,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "parameters": {a.name: a.meaning for a in d.parameters},
         "data": {a.name: a.meaning for a in d.data},
         "point_data": {a.name: a.meaning for a in d.point_data},
-        "places": [list(place) for place in d.dof_nodes],
+        "places": [list(dof) for dof in d.dof_nodes],
         "history": list(d.history),
         **({"internal": list(d.internal)} if d.internal else {}),
         **({"cell": d.cell} if d.cell else {}),

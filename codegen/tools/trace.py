@@ -23,14 +23,14 @@ def show(definition: Definition) -> None:
     page = len(reachable([definition.potential, *(n for _, n in definition.fields)]))
     console.print(f"page: a graph of {page} nodes; tasks: {', '.join(tasks(definition))}")
     if definition.point is not None:
-        chosen = pipeline.form(definition)
-        console.print(f"form: {'at points' if chosen.at_points else 'whole element'}: {chosen.why}")
+        form = pipeline.form(definition)
+        console.print(f"form: {'at points' if form.at_points else 'whole element'}: {form.why}")
     for task, function in pipeline.compile_model(definition).functions.items():
         console.rule(f"{definition.name} {task}", align="left")
         stages = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
         stages.add_column(no_wrap=True)
-        for stage, words in _stages(definition, function):
-            stages.add_row(stage, words)
+        for stage, text in _stages(definition, function):
+            stages.add_row(stage, text)
         console.print(stages)
         console.print(_passes(function))
 
@@ -47,8 +47,8 @@ def _stages(d: Definition, f: Function) -> Iterator[tuple[str, str]]:
     loops = sum(stage.loop is not None for stage in plan.stages)
     per_point = f", {plan.operations_per_point} at each point" if loops else ""
     yield "schedule", f"{plan.operations_once} operations once{per_point}; {_count(loops, 'loop')}"
-    before, after = peak_live(f.best.plan), peak_live(plan)
-    moved = f"{before} values live at most, {after} in the printed order"
+    scheduled, after = peak_live(f.best.plan), peak_live(plan)
+    moved = f"{scheduled} values live at most, {after} in the printed order"
     yield "order", moved if plan is not f.best.plan else f"as scheduled, {after} values live"
     yield "print", f"{f.printer}: {f.temporaries} temporaries, {f.text.count(chr(10))} lines of C"
 

@@ -117,9 +117,9 @@ def _generate(paths: Sequence[Path], folder: Path, seconds: float, on: On) -> in
     errors = {name: r.errors for name, r in reports.items()}
     Console().print(_table(made, errors, _times(definitions, made)))
     for name, report in reports.items():
-        print(f"{name}: {report.told(seconds)}")
+        print(f"{name}: {report.summary(seconds)}")
         if report.tasks:
-            unchecked.append(f"{name}: {report.untold(seconds)}")
+            unchecked.append(f"{name}: {report.omitted_tasks(seconds)}")
     for d in (d for d in definitions if d.prescribed):
         print(f"{d.name} gives derivatives of its own: residual and tangent were not compared")
     for d in definitions:
@@ -128,7 +128,12 @@ def _generate(paths: Sequence[Path], folder: Path, seconds: float, on: On) -> in
             print(f"softehl: {d.name}: {task} is not a number: {what} has none", file=sys.stderr)
     for message in unchecked:
         print(f"softehl: {message}", file=sys.stderr)
-    return max([2 * bool(unchecked), *(_judge(name, found) for name, found in errors.items())])
+    return max(
+        [
+            2 * bool(unchecked),
+            *(_judge(name, found_errors) for name, found_errors in errors.items()),
+        ]
+    )
 
 
 def _reports(
@@ -172,14 +177,14 @@ def _entries(files: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _judge(name: str, errors: Mapping[str, float]) -> int:
-    wrong = {t: e for t, e in errors.items() if not e <= verification.BOUND}
-    for task, error in wrong.items():
+    excessive = {t: e for t, e in errors.items() if not e <= verification.BOUND}
+    for task, error in excessive.items():
         print(
             f"softehl: {name}: {task} is off by {error:.1e} of the exact one, allowed is "
             f"{verification.BOUND:.0e}: do not use this kernel",
             file=sys.stderr,
         )
-    return 1 if wrong else 0
+    return 1 if excessive else 0
 
 
 def _table(
@@ -196,8 +201,8 @@ def _table(
         padding=(0, 0, 0, 1),
     )
     for name, entry in _entries(made.files).items():
-        tasks, found = entry["tasks"], dict(errors.get(name, {}))
-        tangent = found.pop(Task.TANGENT, None)
+        tasks, other_errors = entry["tasks"], dict(errors.get(name, {}))
+        tangent = other_errors.pop(Task.TANGENT, None)
         table.add_row(
             name,
             "\n".join(tasks),
@@ -207,7 +212,7 @@ def _table(
             _seconds(made.derived, name),
             _seconds(made.compiled, name),
             "-" if tangent is None else f"{tangent:.1e}",
-            f"{max(found.values(), default=0.0):.1e}" if name in errors else "-",
+            f"{max(other_errors.values(), default=0.0):.1e}" if name in errors else "-",
         )
     return table
 
@@ -221,16 +226,16 @@ def _seconds(measured: Mapping[str, float], name: str) -> str:
 
 def write(folder: Path, made: kernel_cache.Library) -> int:
     """Bring a folder up to date; returns the number of files that changed.  The library is last."""
-    ours, strange = _others(folder, made.files)
-    if strange:
+    generated, foreign = _others(folder, made.files)
+    if foreign:
         raise ModelFileError(
-            f"{folder} holds {', '.join(strange)}, which softehl did not write; give another --out"
+            f"{folder} holds {', '.join(foreign)}, which softehl did not write; give another --out"
         )
     folder.mkdir(parents=True, exist_ok=True)
     files = {name: text.encode() for name, text in made.files.items()}
     files |= {name: (made.folder / name).read_bytes() for name in (build.LIBRARY, build.DIGEST)}
     changed = {n: data for n, data in files.items() if _bytes(folder / n) != data}
-    for name in ours:
+    for name in generated:
         (folder / name).unlink()
     for name, data in changed.items():
         cache_store.write(folder / name, data)
@@ -243,13 +248,13 @@ def _bytes(path: Path) -> bytes | None:
 
 def _others(folder: Path, files: Mapping[str, str]) -> tuple[list[str], list[str]]:
     """C files that `files` does not have: those that an earlier run wrote, and those of others."""
-    ours: list[str] = []
-    strange: list[str] = []
+    generated: list[str] = []
+    foreign: list[str] = []
     for path in sorted(folder.glob("*.[ch]")):
         if path.name not in files:
             start = path.read_text(encoding="utf-8", errors="replace")[:200]
-            (ours if MARK in start else strange).append(path.name)
-    return ours, strange
+            (generated if MARK in start else foreign).append(path.name)
+    return generated, foreign
 
 
 def _check(paths: Sequence[Path], folder: Path, on: On) -> int:
@@ -257,8 +262,8 @@ def _check(paths: Sequence[Path], folder: Path, on: On) -> int:
     model_loader.check_names(" ".join(p.name for p in paths), definitions)
     files, _ = kernel_cache.derive(definitions)
     stale = [n for n, text in files.items() if _bytes(folder / n) != text.encode()]
-    ours, strange = _others(folder, files)
-    stale += ours + strange
+    generated, foreign = _others(folder, files)
+    stale += generated + foreign
     if not build.intact(folder):
         stale.append(build.LIBRARY)
     for name in stale:
@@ -270,11 +275,11 @@ def _check(paths: Sequence[Path], folder: Path, on: On) -> int:
 
 
 def _trace(paths: Sequence[Path], name: str, on: On) -> int:
-    found = [d for p in paths for d in model_loader.definitions(p, on)]
-    for d in found:
+    definitions = [d for p in paths for d in model_loader.definitions(p, on)]
+    for d in definitions:
         if d.name == name:
             show_trace(d)
             return 0
-    names = ", ".join(d.name for d in found)
+    names = ", ".join(d.name for d in definitions)
     print(f"softehl: no model {name!r}; there are {names}", file=sys.stderr)
     return 2

@@ -79,7 +79,7 @@ class Exact:
     """Of the slopes of a local iteration, which need not be exact."""
     close: Number = Decimal(10) ** -8
     """Relative change from which on the slopes of a local iteration are kept."""
-    near: Number = Decimal(10) ** -80
+    step_tolerance: Number = Decimal(10) ** -80
     """Relative change at which a local iteration has ended."""
 
     def __init__(self) -> None:
@@ -200,7 +200,7 @@ class Doubles(Exact):
     step = 1e-5
     coarse = 1e-6
     close = 1e-8
-    near = 1e-12
+    step_tolerance = 1e-12
 
     def __init__(self) -> None:
         self.functions = _guarded(math, lambda f: f)

@@ -53,25 +53,25 @@ class Report:
     tasks: list[str] = field(default_factory=list)
     late: bool = False
 
-    def told(self, seconds: float) -> str:
+    def summary(self, seconds: float) -> str:
         """Extent of the check, in one line."""
         left = {
             "without a real value": self.unreal,
             "without a local solution": self.unsolved,
             "where rounding hides the result": self.unclear,
         }
-        words = [f"compared with its page at {self.compared - self.unclear} states"]
+        parts = [f"compared with its page at {self.compared - self.unclear} states"]
         out = [f"{count} {what}" for what, count in left.items() if count]
-        words += [f"left out: {', '.join(out)}"] if out else []
+        parts += [f"left out: {', '.join(out)}"] if out else []
         if self.missing:
             more = len(self.missing) - SHOWN
-            shown = self.missing[:SHOWN] + ([f"{more} more"] if more > 0 else [])
-            words.append(f"not reached: {', '.join(shown)}")
+            named = self.missing[:SHOWN] + ([f"{more} more"] if more > 0 else [])
+            parts.append(f"not reached: {', '.join(named)}")
         if self.late:
-            words.append(f"not all states in {seconds:g} s: --check-seconds gives more")
-        return "; ".join(words)
+            parts.append(f"not all states in {seconds:g} s: --check-seconds gives more")
+        return "; ".join(parts)
 
-    def untold(self, seconds: float) -> str:
+    def omitted_tasks(self, seconds: float) -> str:
         """Tasks that could not be compared, and what to do."""
         why = f"the {seconds:g} s of --check-seconds are too few"
         if not self.late:
@@ -108,9 +108,9 @@ class Comparison:
         At once with all rows added, so that every task is met early, then row by row.
         """
         called = self.batch(states)
-        places = [len(states) - 1, 0] if self.size <= ROWS else [len(states) - 1]
-        self._at(called, places[0], [self._direction()], tasks, far=False)
-        for e in places:
+        indices = [len(states) - 1, 0] if self.size <= ROWS else [len(states) - 1]
+        self._at(called, indices[0], [self._direction()], tasks, far=False)
+        for e in indices:
             self._at(called, e, self._combs(), tasks, far=False)
 
     def far(self, state: State, others: Sequence[State], tasks: Sequence[str]) -> None:
@@ -153,15 +153,15 @@ class Comparison:
 
     def _rounding(self, view: _View, task: str, *, far: bool) -> float | None:
         """The error that rounding explains; None if it explains any."""
-        digits, doubles = view.least(task) if far else (0.0, 0.0)
+        digits, doubles = view.smallest_scale(task) if far else (0.0, 0.0)
         if digits > LOST:
             return None
         try:
             page = ReferenceTasks(self.rounded, view.page.state)
-            spread = max(doubles, view.spread(task, page))
+            change = max(doubles, view.change(task, page))
         except NotRealError:
             return None if far else 0.0
-        return ROUNDINGS * spread if spread <= LOST else None
+        return ROUNDINGS * change if change <= LOST else None
 
 
 class _View:
@@ -171,25 +171,25 @@ class _View:
         self, d: Definition, called: Batch, e: int, left: list[Vector], page: ReferenceTasks
     ):
         self.d, self.called, self.e, self.left, self.page = d, called, e, left, page
-        self._known: dict[Any, Vector] = {}
+        self._memo: dict[Any, Vector] = {}
         self._rows: Vector | None = None
 
     def error(self, task: str) -> float:
         """Largest relative error of the values of a task; infinite if one is not a number."""
-        found, exact = self.found(task), self.expected(task, self.page)
+        computed, exact = self.computed(task), self.expected(task, self.page)
         scale = self.scales(task, exact)
-        errors = [abs(a - b) / s for a, b, s in zip(found, exact, scale, strict=True)]
+        errors = [abs(a - b) / s for a, b, s in zip(computed, exact, scale, strict=True)]
         return max(map(finite, errors), default=0.0)
 
-    def spread(self, task: str, other: ReferenceTasks) -> float:
+    def change(self, task: str, other: ReferenceTasks) -> float:
         """Largest difference between the page and another evaluation of it, over the scale."""
         exact = self.expected(task, self.page)
-        given = self.expected(task, other)
+        reference = self.expected(task, other)
         scale = self.scales(task, exact)
-        changes = [abs(a - b) / s for a, b, s in zip(given, exact, scale, strict=True)]
+        changes = [abs(a - b) / s for a, b, s in zip(reference, exact, scale, strict=True)]
         return max(changes, default=0.0)
 
-    def least(self, task: str) -> tuple[float, float]:
+    def smallest_scale(self, task: str) -> tuple[float, float]:
         """Smallest errors over the smallest scale: of differences in so many digits, of doubles."""
         if task in (abi.Task.ENERGY, *abi.AT_POINTS):
             return 0.0, 0.0
@@ -211,7 +211,7 @@ class _View:
     def _called(self, task: str) -> Vector:
         return self.called.call(task)[0][self.e]
 
-    def found(self, task: str) -> Vector:
+    def computed(self, task: str) -> Vector:
         """Values of the kernel: of the tangent the residual, then products with the direction."""
         values = self._called(task)
         if task in (abi.Task.ENERGY, *abi.AT_POINTS):
@@ -234,9 +234,9 @@ class _View:
     def expected(self, task: str, page: ReferenceTasks) -> Vector:
         """Values of the page, in the order of the kernel."""
         key = (id(page), task)
-        if key not in self._known:
-            self._known[key] = [_double(v) for v in self._expected(task, page)]
-        return self._known[key]
+        if key not in self._memo:
+            self._memo[key] = [_double(v) for v in self._expected(task, page)]
+        return self._memo[key]
 
     def _expected(self, task: str, page: ReferenceTasks) -> Sequence[Any]:
         match task:

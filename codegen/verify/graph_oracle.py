@@ -120,11 +120,11 @@ class Oracle:
 
 def _varied(state: State, step: Number, direction: Sequence[Number]) -> State:
     """A state whose coordinates, data, parameters and (if there are more) dofs have moved."""
-    moved, rest = {}, list(direction)
+    moved, entries = {}, list(direction)
     for array in ("coordinates", "data", "parameters", "dofs"):
         values = exact(getattr(state, array))
-        along = (rest[: len(values)] + [0] * len(values))[: len(values)]
-        moved[array], rest = _along(values, step, along), rest[len(values) :]
+        along = (entries[: len(values)] + [0] * len(values))[: len(values)]
+        moved[array], entries = _along(values, step, along), entries[len(values) :]
     return replace(state, **moved)
 
 

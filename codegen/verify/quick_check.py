@@ -45,9 +45,9 @@ def check(d: Definition, tasks: Sequence[str], library: Path) -> None:
         return
     called = ctypes.CDLL(str(library))
     for state in states:
-        way = _way(states)
-        moved = [_moved(state, s * h, way) for h in LENGTHS for s in (1, -1)]
-        batch = Batch(d, called, [state, *moved], [way] * (1 + len(moved)))
+        direction = _direction(states)
+        moved = [_moved(state, s * h, direction) for h in LENGTHS for s in (1, -1)]
+        batch = Batch(d, called, [state, *moved], [direction] * (1 + len(moved)))
         if any(batch.silent(t) for t in tasks):
             continue
         for task in tasks:
@@ -57,14 +57,14 @@ def check(d: Definition, tasks: Sequence[str], library: Path) -> None:
                     f"{d.name}: {task} is not a number where energy and fields are: "
                     f"{culprit(d, task) or 'a value'} has none"
                 )
-        for task in _contradictions(batch, tasks, way):
+        for task in _contradictions(batch, tasks, direction):
             raise WrongKernelError(
                 f"{d.name}: its {task} contradicts differences; do not use this kernel, and report "
                 "its page as an error of softehl"
             )
 
 
-def _way(states: Sequence[State]) -> Vector:
+def _direction(states: Sequence[State]) -> Vector:
     """A direction that moves every unknown by about its size."""
     sizes = [
         max(map(abs, map(float, u))) or 1.0 for u in zip(*(s.dofs for s in states), strict=True)
@@ -72,35 +72,37 @@ def _way(states: Sequence[State]) -> Vector:
     return [(-1) ** k * (1 + k % 3 / 4) * size for k, size in enumerate(sizes)]
 
 
-def _moved(state: State, h: float, way: Vector) -> State:
-    return replace(state, dofs=[float(u) + h * w for u, w in zip(state.dofs, way, strict=True)])
+def _moved(state: State, h: float, direction: Vector) -> State:
+    return replace(
+        state, dofs=[float(u) + h * w for u, w in zip(state.dofs, direction, strict=True)]
+    )
 
 
-def _contradictions(batch: Batch, tasks: Sequence[str], way: Vector) -> Iterator[str]:
+def _contradictions(batch: Batch, tasks: Sequence[str], direction: Vector) -> Iterator[str]:
     """Tasks that are no slopes of others."""
-    n = len(way)
+    n = len(direction)
     if Task.ENERGY in tasks and Task.RESIDUAL in tasks:
         rows = [batch.call(Task.RESIDUAL)[0][0]]
-        if _differs([v[0:1] for v in batch.call(Task.ENERGY)[0]], rows, way):
+        if _differs([v[0:1] for v in batch.call(Task.ENERGY)[0]], rows, direction):
             yield Task.RESIDUAL
     if Task.TANGENT in tasks:
         residual, tangent = batch.call(Task.TANGENT)
         rows = [tangent[0][n * i : n * (i + 1)] for i in range(n)]
-        if _differs(residual, rows, way):
+        if _differs(residual, rows, direction):
             yield Task.TANGENT
 
 
-def _differs(values: Sequence[Vector], rows: Sequence[Vector], way: Vector) -> bool:
+def _differs(values: Sequence[Vector], rows: Sequence[Vector], direction: Vector) -> bool:
     """True if `rows` are not the slopes of values along a way.
 
     Two differences that agree say so; rounding and kinks make them different.
     """
-    terms = [[a * w for a, w in zip(row, way, strict=True)] for row in rows]
+    terms = [[a * w for a, w in zip(row, direction, strict=True)] for row in rows]
     sizes = [math.fsum(map(abs, t)) for t in terms]
     errors = []
     for h, plus, minus in zip(LENGTHS, values[1::2], values[2::2], strict=True):
-        found = [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
-        errors.append([f - math.fsum(t) for f, t in zip(found, terms, strict=True)])
+        differences = [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
+        errors.append([f - math.fsum(t) for f, t in zip(differences, terms, strict=True)])
     allowed = [BOUND * (s + BOUND * max(sizes)) for s in sizes]
     return any(
         min(abs(one), abs(two)) > a and abs(one - two) < abs(one) / 10

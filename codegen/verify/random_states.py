@@ -46,8 +46,8 @@ def unit_cell(d: Definition) -> tuple[tuple[float, ...], ...] | None:
     for kind in ELEMENTS.values():
         if (len(kind.nodes), kind.dimension) == (d.nodes, d.rule.dimension) and width:
             low, size = min(min(p) for p in kind.nodes), max(map(max, kind.nodes))
-            places = [[float((c - low) / (size - low)) for c in place] for place in kind.nodes]
-            return tuple(tuple((p + [0.0] * width)[:width]) for p in places)
+            points = [[float((c - low) / (size - low)) for c in node] for node in kind.nodes]
+            return tuple(tuple((p + [0.0] * width)[:width]) for p in points)
     return CELLS.get((d.nodes, width))
 
 
@@ -62,14 +62,14 @@ def admissible(definition: Definition, count: int) -> list[State]:
     """
     rng = random.Random(definition.name)
     evaluator = Evaluator(program(definition), Doubles())
-    found: list[State] = []
+    states: list[State] = []
     for attempt in range(ATTEMPTS + count):
         state = draw(definition, rng, attempt)
-        if found:  # the states of a call share its parameters
-            state = replace(state, parameters=found[0].parameters)
+        if states:  # the states of a call share its parameters
+            state = replace(state, parameters=states[0].parameters)
         if evaluator.at(state).real():
-            found.append(state)
-        if len(found) == count:
+            states.append(state)
+        if len(states) == count:
             break
     else:
         name = fault(definition, draw(definition, random.Random(definition.name), ATTEMPTS))
@@ -78,25 +78,25 @@ def admissible(definition: Definition, count: int) -> list[State]:
             "random states near the undeformed element with parameters about 1; say where it has "
             f"one, e.g. m.example({suggestion(definition)})"
         )
-    return found
+    return states
 
 
 def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
     """One random state; the later the attempt, the smaller the variation."""
-    spread = SPREAD * 0.93 ** min(attempt, ATTEMPTS)
-    given = dict(d.example)
+    deviation = SPREAD * 0.93 ** min(attempt, ATTEMPTS)
+    example = dict(d.example)
 
     def vary(value: float) -> float:
-        return value + spread * (abs(value) or 1.0) * rng.uniform(-1, 1)
+        return value + deviation * (abs(value) or 1.0) * rng.uniform(-1, 1)
 
     def about_one(name: str) -> float:
-        return vary(given[name]) if name in given else rng.uniform(0.5, 1.5)
+        return vary(example[name]) if name in example else rng.uniform(0.5, 1.5)
 
     unknowns = [*d.unknowns, *(name for name in _fields(d) for _ in range(2))]
-    dofs = [vary(given[n]) if n in given else spread * rng.uniform(-1, 1) for n in unknowns]
+    dofs = [vary(example[n]) if n in example else deviation * rng.uniform(-1, 1) for n in unknowns]
     rule = _rule(d)
     return State(
-        coordinates=_coordinates(d, rng, spread),
+        coordinates=_coordinates(d, rng, deviation),
         dofs=dofs,
         data=[about_one(a.name) for a in d.data],
         parameters=[about_one(a.name) for a in d.parameters],
@@ -106,15 +106,15 @@ def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
     )
 
 
-def _coordinates(d: Definition, rng: random.Random, spread: float) -> list[float]:
-    given = dict(d.example)
+def _coordinates(d: Definition, rng: random.Random, deviation: float) -> list[float]:
+    example = dict(d.example)
     corners = unit_cell(d)
     out = []
     for a in range(d.nodes):
         for c, name in enumerate(d.coordinates):
             label = f"{name}{a + 1}"
-            if label in given:
-                place = given[label]
+            if label in example:
+                coordinates = example[label]
             elif corners is None:
                 raise NoStateError(
                     f"{d.name} cannot be checked: no cell of {d.nodes} nodes in "
@@ -122,8 +122,8 @@ def _coordinates(d: Definition, rng: random.Random, spread: float) -> list[float
                     f"m.example({label}=...)"
                 )
             else:
-                place = 1 + corners[a][c]
-            out.append(place + spread * rng.uniform(-1, 1))
+                coordinates = 1 + corners[a][c]
+            out.append(coordinates + deviation * rng.uniform(-1, 1))
     return out
 
 

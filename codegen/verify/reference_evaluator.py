@@ -103,7 +103,7 @@ def _function(s: Step, n: Exact) -> Function | None:
         "and": _all,
         "or": _any,
         "pieces": _pieces,
-        "choice": lambda c, a, b: a if _known(c) else b,
+        "choice": lambda c, a, b: a if _decided(c) else b,
         "max": max,
         "min": min,
         "abs": abs,
@@ -139,23 +139,23 @@ def _fixed_power(n: Exact, e: Any) -> Function:
     return lambda a: n.power(a, exponent)
 
 
-def _known(condition: bool | None) -> bool:
+def _decided(condition: bool | None) -> bool:
     if condition is None:
         raise NotRealError
     return condition
 
 
 def _all(*conditions: bool | None) -> bool:
-    return False not in conditions and all(map(_known, conditions))
+    return False not in conditions and all(map(_decided, conditions))
 
 
 def _any(*conditions: bool | None) -> bool:
-    return True in conditions or any(map(_known, conditions))
+    return True in conditions or any(map(_decided, conditions))
 
 
 def _pieces(*pairs: Any) -> Number:
     for condition, value in zip(pairs[::2], pairs[1::2], strict=True):
-        if _known(condition):
+        if _decided(condition):
             return value
     raise NotRealError
 
@@ -215,9 +215,9 @@ class Evaluation:
             case "slope":
                 return self._slope(s, q)
             case "stretches":
-                own, energy = s.content
-                found = n.eigenvalues([row[a] for a in s.args])
-                return self._with(s, q, own, found, (energy,))[0]
+                squares, energy = s.content
+                stretches = n.eigenvalues([row[a] for a in s.args])
+                return self._with(s, q, squares, stretches, (energy,))[0]
         return None
 
     def _input(self, array: str, index: int, q: int) -> Number:
@@ -240,28 +240,28 @@ class Evaluation:
         return n.sum(s.slot, len(terms))(*terms)
 
     def _with(
-        self, s: Step, q: int, slots: Sequence[int], values: Vector, wanted: Sequence[int]
+        self, s: Step, q: int, slots: Sequence[int], values: Vector, results: Sequence[int]
     ) -> Vector:
-        """Values of `wanted` if `slots` of point q have other values, by the inner operations."""
+        """Values of `results` if `slots` of point q have other values, by the inner operations."""
         inner = self.evaluator.inner(s)
-        whole = any(o.step.name == "integral" for o in inner)
-        rows = self.rows if whole else self.rows[q : q + 1]
-        kept = [[row[o.step.slot] for o in inner] for row in rows]
-        before = [[row[k] for k in slots] for row in rows]
-        held, self.frozen = self.frozen, frozenset(slots)
+        all_points = any(o.step.name == "integral" for o in inner)
+        rows = self.rows if all_points else self.rows[q : q + 1]
+        saved = [[row[o.step.slot] for o in inner] for row in rows]
+        previous = [[row[k] for k in slots] for row in rows]
+        frozen, self.frozen = self.frozen, frozenset(slots)
         try:
             for k, v in zip(slots, values, strict=True):
-                shared = whole and not self.evaluator.program.steps[k].varying
+                shared = all_points and not self.evaluator.program.steps[k].varying
                 for row in rows if shared else [self.rows[q]]:
                     row[k] = v
-            self.run(inner, None if whole else q)
-            return [self.rows[q][k] for k in wanted]
+            self.run(inner, None if all_points else q)
+            return [self.rows[q][k] for k in results]
         finally:
-            self.frozen = held
-            for row, old, given in zip(rows, kept, before, strict=True):
+            self.frozen = frozen
+            for row, old, restored in zip(rows, saved, previous, strict=True):
                 for o, v in zip(inner, old, strict=True):
                     row[o.step.slot] = v
-                for k, v in zip(slots, given, strict=True):
+                for k, v in zip(slots, restored, strict=True):
                     row[k] = v
 
     def _slope(self, s: Step, q: int) -> Number:
@@ -276,11 +276,11 @@ class Evaluation:
 
     def largest(self) -> Number:
         """Largest part of a potential: what the digits of a difference are counted from."""
-        steps, found = self.evaluator.program.steps, []
+        steps, sizes = self.evaluator.program.steps, []
         for slot, _ in self.evaluator.program.potentials:
             parts = [a for a in steps[slot].args if steps[slot].name in ("sum", "integral")]
-            found += [self.value(k, q) for k in (slot, *parts) for q in range(len(self.rows))]
-        return max(map(abs, found))
+            sizes += [self.value(k, q) for k in (slot, *parts) for q in range(len(self.rows))]
+        return max(map(abs, sizes))
 
     def real(self) -> bool:
         """True if potentials and fields have real values."""
@@ -311,19 +311,21 @@ class Evaluation:
         def residual(values: Vector) -> Vector:
             return self._with(s, q, unknowns, values, equations)
 
-        found, inverse = self.solved.get((s.slot, q), ([row[a] for a in s.args], None))
+        solution, inverse = self.solved.get((s.slot, q), ([row[a] for a in s.args], None))
         changed: Number = None
         for _ in range(ITERATIONS):
-            inverse = inverse or _inverse(_slopes(residual, found, n.coarse))
-            g = residual(found)
+            inverse = inverse or _inverse(_jacobian(residual, solution, n.coarse))
+            g = residual(solution)
             step = [sum(a * b for a, b in zip(line, g, strict=True)) for line in inverse]
-            found = [v - d for v, d in zip(found, step, strict=True)]
-            size, before = max(map(abs, found)), changed
+            solution = [v - d for v, d in zip(solution, step, strict=True)]
+            size, previous = max(map(abs, solution)), changed
             changed = max(map(abs, step))
-            least = n.near * (size or 1)
-            if changed <= least or (before is not None and 2 * changed > before <= 10**6 * least):
-                self.solved[s.slot, q] = found, inverse
-                return found
+            tolerance = n.step_tolerance * (size or 1)
+            if changed <= tolerance or (
+                previous is not None and 2 * changed > previous <= 10**6 * tolerance
+            ):
+                self.solved[s.slot, q] = solution, inverse
+                return solution
             if changed > n.close * size:
                 inverse = None
         raise NotRealError
@@ -349,7 +351,7 @@ class Evaluation:
         return made
 
 
-def _slopes(residual: Callable[[Vector], Vector], at: Vector, h: Number) -> list[Vector]:
+def _jacobian(residual: Callable[[Vector], Vector], at: Vector, h: Number) -> list[Vector]:
     columns = []
     for j in range(len(at)):
         plus, minus = (residual([v + t * h * (i == j) for i, v in enumerate(at)]) for t in (1, -1))
@@ -397,22 +399,22 @@ class ReferenceTasks:
     def __init__(self, evaluator: Evaluator, state: State) -> None:
         self.evaluator, self.state = evaluator, state
         self.program = evaluator.program
-        self.here = evaluator.at(state)
+        self.base = evaluator.at(state)
 
     @_in_digits
     def energy(self) -> Number:
         """Sum of the potentials."""
-        return sum(self.here.value(slot) for slot, _ in self.program.potentials)
+        return sum(self.base.value(slot) for slot, _ in self.program.potentials)
 
     @_in_digits
     def fields(self) -> list[Vector]:
         """Fields, [point][field]."""
-        return self._fields(self.here)
+        return self._fields(self.base)
 
     @_in_digits
     def residual(self, along: Along) -> Vector:
         """Combinations of the residual."""
-        return self._residual(self.here, along)
+        return self._residual(self.base, along)
 
     @_in_digits
     def rate(self, array: str, direction: Sequence[float], along: Along) -> Vector:
@@ -429,7 +431,7 @@ class ReferenceTasks:
         """Derivative of the fields, [point][field], along a variation that ends with the dofs."""
         moves, h = self._split(direction), self.evaluator.arithmetic.step
         roots = tuple(self.program.fields)
-        plus, minus = (self._fields(self.here.moved(_times(moves, t * h), roots)) for t in (1, -1))
+        plus, minus = (self._fields(self.base.moved(_times(moves, t * h), roots)) for t in (1, -1))
         return [
             [(a - b) / (2 * h) for a, b in zip(*rows, strict=True)]
             for rows in zip(plus, minus, strict=True)
@@ -439,7 +441,7 @@ class ReferenceTasks:
     def noise(self, order: int) -> float:
         """Error of a derivative of this order by differences: digits that cancel."""
         n = self.evaluator.arithmetic
-        return float(self.here.largest() * n.near / n.step**order)
+        return float(self.base.largest() * n.step_tolerance / n.step**order)
 
     @_in_digits
     def rounding(self, order: int, changes: float) -> float:
@@ -448,18 +450,18 @@ class ReferenceTasks:
         The page is taken to change so many times within the size of the unknowns.
         """
         size = max(abs(float(u)) for u in self.state.dofs) or 1.0
-        return UNIT * float(self.here.largest()) * (changes / size) ** order
+        return UNIT * float(self.base.largest()) * (changes / size) ** order
 
     def _numbers(self, values: Sequence[float]) -> Vector:
         return [self.evaluator.arithmetic.number(v) for v in values]
 
     def _split(self, direction: Sequence[float]) -> dict[str, Vector]:
-        moves, rest = {}, self._numbers(direction)
+        moves, numbers = {}, self._numbers(direction)
         for array in ("coordinates", "data", "parameters", "dofs"):
             size = len(getattr(self.state, array))
-            if rest[:size]:
-                moves[array] = rest[:size]
-            rest = rest[size:]
+            if numbers[:size]:
+                moves[array] = numbers[:size]
+            numbers = numbers[size:]
         return moves
 
     def _fields(self, at: Evaluation) -> list[Vector]:
@@ -484,7 +486,7 @@ class ReferenceTasks:
         h = self.evaluator.arithmetic.step
         roots = tuple(slot for slot, _ in self.program.potentials)
         plus, minus = (
-            self._residual(self.here.moved(_times(moves, t * h), roots), along) for t in (1, -1)
+            self._residual(self.base.moved(_times(moves, t * h), roots), along) for t in (1, -1)
         )
         return [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
 

@@ -42,7 +42,7 @@ Slopes = list[tuple[list[float], list[list[float]]]]
 
 
 @dataclass
-class Found:
+class ProbedState:
     """A state with real values and the targets that it meets."""
 
     state: State
@@ -51,7 +51,7 @@ class Found:
 
 
 @dataclass
-class Explorer:
+class StateSearch:
     """Far and steered states of one page, from an ordinary one."""
 
     program: Program
@@ -64,27 +64,27 @@ class Explorer:
         self.d: Definition = self.program.definition
         self.evaluator = Evaluator(self.program, Doubles())
         self.rng = random.Random(f"{self.d.name} far")
-        self.pool: list[Found] = []
+        self.pool: list[ProbedState] = []
 
     def states(self, seconds: float) -> Iterator[State]:
         """States in the order in which they are worth comparing; so long is searched at most."""
         self.evaluator.deadline = perf_counter() + seconds
-        known = [f for s in self.nominal[:1] if (f := self.probe(s))]
-        if not known:
+        probed = [f for s in self.nominal[:1] if (f := self.probe(s))]
+        if not probed:
             return
         self._draw()
-        wanted = self._targets() - known[0].meets
-        for f in self._cover(wanted):
+        open_targets = self._targets() - probed[0].meets
+        for f in self._cover(open_targets):
             yield f.state
-            wanted -= f.meets
-        if wanted:
-            for f in self._steered(known[0], wanted):
+            open_targets -= f.meets
+        if open_targets:
+            for f in self._steered(probed[0], open_targets):
                 yield f.state
-                wanted -= f.meets
-        conditions = [self.program.switches[k].condition for k, _ in sorted(wanted)]
-        pairs = zip(sorted(wanted), conditions, strict=True)
+                open_targets -= f.meets
+        conditions = [self.program.switches[k].condition for k, _ in sorted(open_targets)]
+        pairs = zip(sorted(open_targets), conditions, strict=True)
         self.missing = [t for t, condition in pairs if condition or t[1] == "near"]
-        yield from self._near([*known, *self.pool])
+        yield from self._near_conditions([*probed, *self.pool])
         yield from (f.state for f in self.pool[:FAR])
 
     def text(self, target: Target) -> str:
@@ -98,7 +98,7 @@ class Explorer:
 
     # probing ------------------------------------------------------------------------------------
 
-    def probe(self, state: State) -> Found | None:
+    def probe(self, state: State) -> ProbedState | None:
         """The state in doubles; None without real values, or if the page forbids it."""
         self.late = self.late or perf_counter() > self.evaluator.deadline
         if self.late or not _allowed(self.d, state):
@@ -116,14 +116,14 @@ class Explorer:
             for k, switch in enumerate(self.program.switches)
             for side in _sides(switch, values[k])
         }
-        return Found(state, values, meets)
+        return ProbedState(state, values, meets)
 
     def _targets(self) -> set[Target]:
-        found = set()
+        targets = set()
         for k, switch in enumerate(self.program.switches):
             sides = ("below", "above") if switch.condition else ("below", "near", "above")
-            found |= {(k, side) for side in sides}
-        return found
+            targets |= {(k, side) for side in sides}
+        return targets
 
     # far ----------------------------------------------------------------------------------------
 
@@ -131,11 +131,11 @@ class Explorer:
         for k in range(DRAWN):
             if self.late:
                 break
-            found = self.probe(self._far(k))
-            if found is None:
+            probed = self.probe(self._far(k))
+            if probed is None:
                 self.unreal += not self.late
             else:
-                self.pool.append(found)
+                self.pool.append(probed)
 
     def _far(self, k: int) -> State:
         """The k-th far state: modes in turn, at scales that fill 1e-3 to 1e3 evenly."""
@@ -166,21 +166,21 @@ class Explorer:
     def _linear(self, s: State, scale: float) -> list[float]:
         """Unknowns of one name as a linear field of their nodes' places."""
         width = len(self.d.coordinates)
-        spread = max(
+        extent = max(
             [abs(float(a) - float(b)) for a in s.coordinates for b in s.coordinates] or [1]
         )
-        slopes: dict[str, list[float]] = {}
+        gradients: dict[str, list[float]] = {}
         out = []
         for k, v in enumerate(s.dofs):
             name, node = self.d.dof_nodes[k] if k < len(self.d.dof_nodes) else ("", None)
-            if name not in slopes:
-                slopes[name] = [scale * self.rng.uniform(-1, 1) for _ in range(width + 1)]
-            first, *rest = slopes[name]
-            place = s.coordinates[width * (node or 0) : width * ((node or 0) + 1)]
+            if name not in gradients:
+                gradients[name] = [scale * self.rng.uniform(-1, 1) for _ in range(width + 1)]
+            first, *offsets = gradients[name]
+            point = s.coordinates[width * (node or 0) : width * ((node or 0) + 1)]
             origin = s.coordinates[:width]
             moved = sum(
-                c * (float(x) - float(o)) / (spread or 1)
-                for c, x, o in zip(rest, place, origin, strict=True)
+                c * (float(x) - float(o)) / (extent or 1)
+                for c, x, o in zip(offsets, point, origin, strict=True)
             )
             out.append(v + (self._size(k, v) or 1) * (first + moved))
         return out
@@ -200,9 +200,9 @@ class Explorer:
 
     # steered ------------------------------------------------------------------------------------
 
-    def _cover(self, wanted: set[Target]) -> Iterator[Found]:
+    def _cover(self, open_targets: set[Target]) -> Iterator[ProbedState]:
         """States of the pool, each the one that meets most of what the others do not."""
-        left = set(wanted)
+        left = set(open_targets)
         while left and self.pool:
             best = max(self.pool, key=lambda f: len(f.meets & left))
             if not best.meets & left:
@@ -211,22 +211,22 @@ class Explorer:
             self.pool.remove(best)
             yield best
 
-    def _steered(self, start: Found, wanted: set[Target]) -> Iterator[Found]:
+    def _steered(self, start: ProbedState, open_targets: set[Target]) -> Iterator[ProbedState]:
         """States by line searches, from the first state at which the switch has a value."""
-        left = set(wanted)
-        slopes: dict[int, Slopes] = {}
-        for target in sorted(wanted):
-            known = [f for f in (start, *self.pool) if f.values[target[0]]]
-            if target not in left or not known:
+        left = set(open_targets)
+        gradients: dict[int, Slopes] = {}
+        for target in sorted(open_targets):
+            starts = [f for f in (start, *self.pool) if f.values[target[0]]]
+            if target not in left or not starts:
                 continue
-            if id(known[0]) not in slopes:
-                slopes[id(known[0])] = self._slopes(known[0])
-            found = self._along_lines(known[0], target, slopes[id(known[0])])
-            if found is not None:
-                left -= found.meets
-                yield found
+            if id(starts[0]) not in gradients:
+                gradients[id(starts[0])] = self._gradient(starts[0])
+            reached = self._along_lines(starts[0], target, gradients[id(starts[0])])
+            if reached is not None:
+                left -= reached.meets
+                yield reached
 
-    def _slopes(self, start: Found) -> Slopes:
+    def _gradient(self, start: ProbedState) -> Slopes:
         """Directions, and by how much they change the operands of every switch."""
         base = _flat(start.state)
         out = []
@@ -254,7 +254,9 @@ class Explorer:
             if not first <= j < first + count:
                 yield [(abs(v) or 1.0) * (k == j) for k in range(len(base))]
 
-    def _along_lines(self, start: Found, target: Target, slopes: Slopes) -> Found | None:
+    def _along_lines(
+        self, start: ProbedState, target: Target, gradient: Slopes
+    ) -> ProbedState | None:
         """A state that meets a target, along the directions that change its switch most."""
         number, side = target
         switch, values = self.program.switches[number], start.values[number]
@@ -262,7 +264,7 @@ class Explorer:
             return None
         edge = 0.0 if switch.condition or side == "near" else BEYOND
         level = {"below": -edge, "near": 0.0, "above": edge}[side]
-        ranked = sorted(slopes, key=lambda x: -max(map(abs, x[1][number]), default=0))
+        ranked = sorted(gradient, key=lambda x: -max(map(abs, x[1][number]), default=0))
         base = _flat(start.state)
         for direction, change in ranked[:LINES]:
             rates = [(v, c) for v, c in zip(values, change[number], strict=False) if c]
@@ -273,16 +275,16 @@ class Explorer:
             steps += [sign * 10.0**k for k in range(-2, 5) for sign in (1, -1)]
             last = start
             for t in steps:
-                found = self.probe(_state(start.state, _plus(base, t, direction)))
-                if found is None:
+                probed = self.probe(_state(start.state, _plus(base, t, direction)))
+                if probed is None:
                     continue
-                if target in found.meets:
-                    return found
-                if side == "near" and (f := self._between(last, found, target)):
+                if target in probed.meets:
+                    return probed
+                if side == "near" and (f := self._between(last, probed, target)):
                     return f
         return None
 
-    def _between(self, a: Found, b: Found, target: Target) -> Found | None:
+    def _between(self, a: ProbedState, b: ProbedState, target: Target) -> ProbedState | None:
         """A state near zero of a switch between two on different sides of it."""
         x, y = (f.values[target[0]] for f in (a, b))
         if not x or not y or (x[0] > 0) == (y[0] > 0):
@@ -292,7 +294,9 @@ class Explorer:
                 return f
         return None
 
-    def _bisected(self, a: Found, b: Found, number: int, times: int) -> Iterator[Found]:
+    def _bisected(
+        self, a: ProbedState, b: ProbedState, number: int, times: int
+    ) -> Iterator[ProbedState]:
         """States on the line between two, ever closer to where the first value changes sign."""
         for _ in range(times):
             half = [(p + q) / 2 for p, q in zip(_flat(a.state), _flat(b.state), strict=True)]
@@ -303,20 +307,20 @@ class Explorer:
             above = c.values[number][0] > 0
             a, b = (c, b) if (a.values[number][0] > 0) == above else (a, c)
 
-    def _near(self, pool: Sequence[Found]) -> Iterator[State]:
+    def _near_conditions(self, pool: Sequence[ProbedState]) -> Iterator[State]:
         """On both sides of every condition, close to it."""
         for k, switch in enumerate(self.program.switches):
-            sides: dict[bool, Found] = {}
+            sides: dict[bool, ProbedState] = {}
             for f in pool if switch.condition else ():
                 if f.values[k]:
                     sides.setdefault(f.values[k][0] > 0, f)
             if len(sides) == 2:
                 times = 10  # halves: NEAR of the line
-                near = {
+                close_states = {
                     f.values[k][0] > 0: f
                     for f in self._bisected(sides[False], sides[True], k, times)
                 }
-                yield from (f.state for f in near.values())
+                yield from (f.state for f in close_states.values())
 
 
 def _values(switch: Switch, rows: Sequence[list[Any]]) -> list[float]:
@@ -353,10 +357,10 @@ def _allowed(d: Definition, s: State) -> bool:
 
 def _scaled(s: State, factors: Sequence[float]) -> State:
     """Parameters, data and data of points times factors."""
-    rest = iter(factors)
-    parameters = [v * next(rest) for v in s.parameters]
-    data = [v * next(rest) for v in s.data]
-    points = [[v * next(rest) for v in row] for row in s.point_data]
+    remaining = iter(factors)
+    parameters = [v * next(remaining) for v in s.parameters]
+    data = [v * next(remaining) for v in s.data]
+    points = [[v * next(remaining) for v in row] for row in s.point_data]
     return replace(s, parameters=parameters, data=data, point_data=points)
 
 
@@ -367,12 +371,12 @@ def _flat(s: State) -> list[float]:
 
 def _state(like: State, values: Sequence[float]) -> State:
     """A state of the same shape."""
-    rest = list(values)
+    remaining = list(values)
 
     def take(count: int) -> list[float]:
-        taken = rest[:count]
-        del rest[:count]
-        return taken
+        head = remaining[:count]
+        del remaining[:count]
+        return head
 
     return replace(
         like,

@@ -75,13 +75,13 @@ class Program:
 
     def moved(self) -> set[int]:
         """Unknowns that the potentials see where they are not frozen, by number."""
-        found = set()
+        slots = set()
         for slot, frozen in self.potentials:
             for k in _needed(self.steps, [slot], stop=frozen):
                 s = self.steps[k]
                 if s.name == "input" and s.content[0] == "dofs":
-                    found.add(s.content[1])
-        return found
+                    slots.add(s.content[1])
+        return slots
 
     def above(self, roots: Iterable[int]) -> list[Step]:
         """The operations of `main` that `roots` need, in order."""
@@ -126,42 +126,42 @@ class _Builder:
         self.record = record
         self.steps: list[Step] = []
         self.switches: list[Switch] = []
-        self._known: dict[Any, int] = {}
+        self._slots: dict[Any, int] = {}
 
     def __call__(self, expression: Any) -> int:
         """Slot of an expression; those below it come first."""
         waiting = [sp.sympify(expression)]
         while waiting:
             e = waiting[-1]
-            if e not in self._known:
-                below = [c for c in self._children(e) if c not in self._known]
+            if e not in self._slots:
+                below = [c for c in self._children(e) if c not in self._slots]
                 if below:
                     waiting += reversed(below)
                     continue
-                self._known[e] = self._made(e)
+                self._slots[e] = self._made(e)
             waiting.pop()
-        return self._known[sp.sympify(expression)]
+        return self._slots[sp.sympify(expression)]
 
     def _children(self, e: Any) -> Sequence[Any]:
         if e in self.record.inputs:
             return ()
-        found = self.record.meanings.get(e)
-        if found is None:
+        meaning = self.record.meanings.get(e)
+        if meaning is None:
             return (e.definition,) if hasattr(e, "definition") else self._parts(e)
         parts: Sequence[Any]
-        match found:
+        match meaning:
             case Local():
                 parts = ()
             case Integral():
-                parts = (found.integrand,)
+                parts = (meaning.integrand,)
             case Implicit():
-                parts = (*found.unknowns, *found.equations, *found.start)
+                parts = (*meaning.unknowns, *meaning.equations, *meaning.start)
             case Principal():
-                parts = (*found.squares, found.energy, *found.entries)
+                parts = (*meaning.squares, meaning.energy, *meaning.entries)
             case Slope():
-                parts = (found.value, found.by)
+                parts = (meaning.value, meaning.by)
             case _:
-                parts = (found,)
+                parts = (meaning,)
         return [sp.sympify(p) for p in parts]
 
     def _parts(self, e: Any) -> Sequence[Any]:
@@ -174,16 +174,16 @@ class _Builder:
         return () if e.is_Number else e.args
 
     def _at(self, *parts: Any) -> tuple[int, ...]:
-        return tuple(self._known[sp.sympify(p)] for p in parts)
+        return tuple(self._slots[sp.sympify(p)] for p in parts)
 
     def _made(self, e: Any) -> int:
         if e in self.record.inputs:
             return self._argument(*self.record.inputs[e])
-        found = self.record.meanings.get(e)
-        if found is not None:
-            return self._meaning(found)
+        meaning = self.record.meanings.get(e)
+        if meaning is not None:
+            return self._meaning(meaning)
         if hasattr(e, "definition"):
-            return self._known[e.definition]
+            return self._slots[e.definition]
         return self._operation(e)
 
     def _argument(self, array: str, index: int) -> int:
@@ -200,9 +200,11 @@ class _Builder:
             case Implicit():
                 return self._solution(m)
             case Principal():
-                own, energy = self._at(*m.squares), self._at(m.energy)
-                inner = self._between(own, energy)
-                return self._add("stretches", self._at(*m.entries), (own, energy[0]), inner=inner)
+                squares, energy = self._at(*m.squares), self._at(m.energy)
+                inner = self._between(squares, energy)
+                return self._add(
+                    "stretches", self._at(*m.entries), (squares, energy[0]), inner=inner
+                )
             case Slope():
                 (value,), (by,) = self._at(m.value), self._at(m.by)
                 inner = self._between((by,), (value,))
@@ -211,13 +213,13 @@ class _Builder:
 
     def _solution(self, m: Implicit) -> int:
         key = (m.equations, m.unknowns)
-        if key not in self._known:
-            own, equations = self._at(*m.unknowns), self._at(*m.equations)
+        if key not in self._slots:
+            unknowns, equations = self._at(*m.unknowns), self._at(*m.equations)
             start = self._at(*m.start)
-            inner = self._between(own, equations)
-            content = (own, equations)
-            self._known[key] = self._add("solve", start, content, inner=inner)
-        return self._add("item", (self._known[key],), m.index)
+            inner = self._between(unknowns, equations)
+            content = (unknowns, equations)
+            self._slots[key] = self._add("solve", start, content, inner=inner)
+        return self._add("item", (self._slots[key],), m.index)
 
     def _operation(self, e: Any) -> int:
         at = self._at(*self._parts(e))
@@ -268,7 +270,7 @@ class _Builder:
         inner: tuple[Step, ...] = (),
     ) -> int:
         slot = len(self.steps)
-        own: set[int] = {slot} if name == "local" else set()
+        local_unknowns: set[int] = {slot} if name == "local" else set()
         below = [self.steps[a] for a in args]
         if name in ("solve", "stretches"):
             unknowns, results = content
@@ -277,10 +279,10 @@ class _Builder:
             hidden = set(unknowns)
         else:
             hidden = set()
-        locals_ = frozenset(own | {k for s in below for k in s.locals} - hidden)
-        found = frozenset(depends) | {x for s in below for x in s.depends}
+        locals_ = frozenset(local_unknowns | {k for s in below for k in s.locals} - hidden)
+        dependencies = frozenset(depends) | {x for s in below for x in s.depends}
         varies = any(s.varying for s in below) if varying is None else varying
-        self.steps.append(Step(slot, name, args, content, varies, found, locals_, inner))
+        self.steps.append(Step(slot, name, args, content, varies, dependencies, locals_, inner))
         return slot
 
     def _between(self, sources: Sequence[int], roots: Sequence[int]) -> tuple[Step, ...]:

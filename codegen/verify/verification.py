@@ -33,7 +33,7 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.verify import random_states
 from softehl.codegen.verify.comparison import BOUND, Comparison, Report, idle
 from softehl.codegen.verify.reference_evaluator import OutOfTimeError
-from softehl.codegen.verify.state_search import Explorer
+from softehl.codegen.verify.state_search import StateSearch
 
 __all__ = ["BOUND", "Report", "check", "culprit", "errors"]
 
@@ -76,7 +76,7 @@ def check(
             f"{definition.name} cannot be checked: its local iteration finds no solution at random "
             f"states; say where it does, e.g. m.example({random_states.suggestion(definition)})"
         )
-    explorer = Explorer(comparison.program, states)
+    explorer = StateSearch(comparison.program, states)
     try:
         comparison.ordinary(states, tasks)
         for state in list(explorer.states(SEARCH * seconds)):
@@ -93,13 +93,13 @@ def check(
 
 def culprit(d: Definition, task: str) -> str | None:
     """Expression without a value in a task whose result is not a number, for the page's author."""
-    slopes = gradient(
+    gradients = gradient(
         d.graph, d.potential, d.directions, constant=d.constant, prescribed=d.prescribed
     )
     states = random_states.admissible(d, BATCH)
-    for nodes in ([slopes[u] for u in d.directions], [x.node for x in outputs(d, task)]):
+    for nodes in ([gradients[u] for u in d.directions], [x.node for x in outputs(d, task)]):
         for state in states:
-            found = random_states.first_fault(nodes, state)
-            if found is not None:
-                return found
+            fault = random_states.first_fault(nodes, state)
+            if fault is not None:
+                return fault
     return None

@@ -176,7 +176,7 @@ def test_both_sides_of_a_condition_are_reached_and_what_is_not_is_said() -> None
     assert any("true" in text or "false" in text for text in report.missing)
     report = check(one(lambda u, k: sp.log(k + u) * u))
     assert report.unreal > 0
-    assert f"{report.unreal} without a real value" in report.told(10)
+    assert f"{report.unreal} without a real value" in report.summary(10)
 
 
 def test_the_check_ends_in_time_and_says_so() -> None:
@@ -186,7 +186,7 @@ def test_the_check_ends_in_time_and_says_so() -> None:
     report = verification.check(d, TASKS, folder / LIBRARY, seconds=0.03)
     assert process_time() - start < 1
     assert report.late
-    assert "--check-seconds gives more" in report.told(0.03)
+    assert "--check-seconds gives more" in report.summary(0.03)
 
 
 AT = """

@@ -61,7 +61,7 @@ class PointInputs:
             first = len(site.coordinates) + len(site.data) + len(site.parameters)
             for k in self.f.needs["direction"]:
                 if array == "dofs" and k >= first:
-                    numbers.update(self._with_slopes(form.all, k - first))
+                    numbers.update(self._with_gradient(form.all, k - first))
                 if array == "data" and 0 <= k - self.f.D < len(site.data):
                     n = k - self.f.D
                     if n in form.data:
@@ -71,7 +71,7 @@ class PointInputs:
                         numbers.update(some if form.data[n].axis is not None else [n])
         return tuple(sorted(numbers))
 
-    def _with_slopes(self, quantities: Sequence[Quantity], k: int) -> list[int]:
+    def _with_gradient(self, quantities: Sequence[Quantity], k: int) -> list[int]:
         """A slope with the other slopes of its component, on which its variation depends."""
         q = quantities[k]
         if q.axis is None:

@@ -402,6 +402,6 @@ def multiply_adds(layout: Layout, tangent: PointOutputs) -> int:
                 for j in pair.components(1)
                 for o in parent.of(j)
             )
-            spread = sum(len(parent.of(i)) for i, _ in pair.entries)
-            total += columns * met + pairs * spread
+            per_entry = sum(len(parent.of(i)) for i, _ in pair.entries)
+            total += columns * met + pairs * per_entry
     return total
