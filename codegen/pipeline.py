@@ -107,7 +107,7 @@ class KernelSource:
 
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
-    """All kernels of one model; `codegen.abi` says what each target is."""
+    """Compile all kernels of one model; `codegen.abi` describes the targets."""
     tasks = task_outputs.tasks(definition)
     if target is Target.UFCX:
         tasks = ufcx.tasks(definition, tasks)
@@ -203,7 +203,7 @@ def _at_point(layout: Layout, task: str) -> Function:
 
 
 def _at_centroid(layout: Layout, task: str, point: PointOutputs) -> point_kernel.At | None:
-    """Values at the centroid that the function of a point reads, None where there are none."""
+    """Values at the centroid that the function of a point reads, None if it reads none."""
     form, needs = layout.form, Needs.of(point.entries)
     first = point_outputs.first_rate(form.definition, task)
     read = {*needs["dofs"], *(k - first for k in needs["direction"])}

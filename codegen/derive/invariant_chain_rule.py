@@ -1,4 +1,4 @@
-"""Chain rules in modal coordinates, through what was found in a potential."""
+"""Chain rules in modal coordinates, through the linear forms and invariants of a potential."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def by_levels(d: Definition, s: Structure) -> Modal:
 
 
 def by_slopes(d: Definition, s: Structure) -> Modal:
-    """Past the linear forms: slopes of what the potential sees by the point values."""
+    """Chain rule that skips the linear forms: derivatives of the top interface by point values."""
     inner = {*s.squares, *s.forms}
     upper = tuple(
         n for n in reachable([s.root, *s.constant], stop=inner.__contains__) if n in inner

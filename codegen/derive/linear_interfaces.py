@@ -1,4 +1,4 @@
-"""Interfaces found by themselves: the few values through which a potential sees its unknowns.
+"""Search for linear interfaces: the few values through which a potential depends on its unknowns.
 
 Element unknowns enter an energy through linear forms (displacement gradients).  A form is
 expanded, exactly, into
@@ -259,7 +259,7 @@ class _Forms:
         return self.point[key], lead
 
     def _mode(self, vector: dict[int, Fraction]) -> tuple[Node, Fraction]:
-        """Modal coordinate of a constant vector: found among the known ones up to a factor."""
+        """Modal coordinate of a constant vector: an existing one up to a factor, or a new one."""
         items = sorted(vector.items())
         lead = items[0][1]
         key = tuple((s, c / lead) for s, c in items)

@@ -60,7 +60,7 @@ def at_centroid(form: PointForm, task: str) -> list[Entry]:
 
 
 def argument(d: Definition, task: str) -> Node | None:
-    """The parameter or datum at the point by which a task derives, None if there is none."""
+    """Return the parameter or datum at the point by which a task differentiates, or None."""
     arguments = [("parameters", a.name, k) for k, a in enumerate(d.parameters)]
     arguments += [("data", a.name, k) for k, a in enumerate(d.data)]
     matches = [d.graph.input(array, k) for array, n, k in arguments if derivative_task(n) == task]

@@ -220,7 +220,7 @@ class _Search:
         return quadratic, {f for f in self.forms if f.id in direct}
 
     def _used(self, targets: Sequence[Node]) -> int:
-        """Number of different quadratic values that the targets are made of as they stand."""
+        """Number of different quadratic values in the targets before the rewrite."""
         inner = reachable(targets, stop=lambda n: self.degree[n] <= 2)
         parts = [self.split(n) for n in inner if self.degree[n] == 2]
         return len({p.shape for p in parts if p is not None and len(p.shape) > 1})
@@ -341,7 +341,7 @@ def _represent(
 
 @dataclass(frozen=True)
 class Structure:
-    """A potential `root` rewritten through what was found in it, with its `constant` values.
+    """Potential `root` in terms of linear forms and squares, with its `constant` values.
 
     `interface` holds the modal coordinates and the point values, `forms` the linear forms of
     these (displacement gradients), `squares` quadratic values of the forms (strain measures);
@@ -357,7 +357,7 @@ class Structure:
 
 
 def linear_forms(d: Definition) -> Structure | None:
-    """The potential through linear forms of the unknowns; None where there is nothing to gain."""
+    """Rewrite the potential through linear forms of the unknowns; None if that saves nothing."""
     if d.interpolated or d.prescribed:
         return None
     g = d.graph

@@ -37,7 +37,7 @@ def arranged_plan(g: Graph, plan: Schedule, roots: Sequence[Node]) -> Schedule:
 
 
 def _runs(block: Sequence[Statement]) -> Iterator[list[Statement]]:
-    """Rows of plain values; everything else on its own."""
+    """Split a block into runs of plain values; any other statement is a run of one."""
 
     def plain(s: Statement) -> bool:
         return isinstance(s, Node) and s.op is not Op.CALL
@@ -66,7 +66,7 @@ def _groups(run: Sequence[Node], outputs: Collection[Node]) -> list[list[Node]]:
 
 
 class _Runs:
-    """`outputs` are the values that something outside their own run uses."""
+    """Runs of a plan; `outputs` are the values that statements outside their run use."""
 
     def __init__(self, g: Graph, plan: Schedule, roots: Sequence[Node]) -> None:
         self.g = g
@@ -102,7 +102,7 @@ class _Runs:
                 self._use(s.otherwise)
 
     def block(self, block: Sequence[Statement], computed: set[Node]) -> list[Statement]:
-        """A block in its new order; `computed` grows by what it computes."""
+        """Return a block in its new order; its values are added to `computed`."""
         out: list[Statement] = []
         for run in _runs(block):
             nodes = [s for s in run if isinstance(s, Node)]

@@ -235,7 +235,7 @@ class Printer:
                 self.statement(depth, s)
 
     def statement(self, depth: int, s: Node) -> None:
-        """A value of its own."""
+        """Print a value as a statement."""
         right = self.expression(s)
         if self.hides(s, right):
             return

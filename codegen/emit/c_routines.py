@@ -112,7 +112,7 @@ static double softehl_mean_bell(double u, double v)
 
 
 def quotient(op: Op, signature: str) -> list[str]:
-    """C function of a `Quotient` and what it needs, callees first."""
+    """C function of a `Quotient` and its callees, callees first."""
     if op is Op.ATAN2:
         return [_ANGLE.format(signature=signature)]
     text = f"""/* ({op}(u) - {op}(v)) / (u - v) */
@@ -140,7 +140,7 @@ def texts(
     routines: Iterable[Routine],
     text: Callable[[Definition, Routine], list[str]] | None = None,
 ) -> list[str]:
-    """C functions of `routines` and what they need, each once, callees first.
+    """C functions of `routines` and their callees, each once, callees first.
 
     text: what prints one of them, if it is another printer than this one.
     """

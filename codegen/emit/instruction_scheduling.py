@@ -52,7 +52,7 @@ class _Sum:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """One instruction: a value of its own, or one term (one or two factors) of a sum."""
+    """One instruction: a value, or one term (one or two factors) of a sum."""
 
     node: Node
     operands: tuple[Node, ...]
@@ -157,7 +157,7 @@ class _Scheduler:
                 self._offer(p)
 
     def _offer(self, p: _Piece) -> None:
-        """A piece whose operands are known: ready, unless its sum must begin with another one."""
+        """Mark a piece as ready, unless its sum must begin with another one."""
         if p.total is not None and p.total.partial is None and p.sign < 0:
             p.total.waiting.append(p)
         elif len(self.ready) < self._window:
@@ -204,7 +204,7 @@ class _Scheduler:
         return cost + WAITING * min(arrival - self.clock, LONGEST_WAIT)
 
     def _compute(self, p: _Piece) -> tuple[Node | None, Node | _Sum]:
-        """The value that is now known (None: a sum that is not complete), and what holds it."""
+        """Return the value that is now computed (None: an incomplete sum) and its register."""
         g, operands = self.g, [self.new.get(a, a) for a in p.operands]
         if p.total is None:
             n = self.new[p.node] = g.rebuild(p.node.op, operands, p.node.payload)

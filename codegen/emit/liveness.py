@@ -56,7 +56,7 @@ class _Backwards:
         return self.seen(sides[0] | sides[1] | _temporaries([s.condition]))
 
     def loop(self, loop: Loop, live: frozenset[Node]) -> frozenset[Node]:
-        """Sums live through the loop, and so does what every turn reads anew."""
+        """Count through a loop: sums and values that every iteration reads stay live."""
         once = _Backwards()
         through = live | set(loop.sums)
         summed = _temporaries(s.args[0] for s in loop.sums)

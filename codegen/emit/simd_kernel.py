@@ -77,7 +77,7 @@ Key = tuple[Slot, Slot | None]
 
 
 def _scatter_targets(d: Definition, task: str) -> list[tuple[list[Key], str]]:
-    """Pairs (components of an output, its place for basis function i)."""
+    """Pairs (components of an output, its index for basis function i)."""
     direct, dofs = len(d.unknowns), dofs_expression(d)
     both = [Slot(True, k) for k in range(d.components)]
     out: list[tuple[list[Key], str]] = [([(s, None) for s in both], f"R[{direct} + i]")]
@@ -240,7 +240,7 @@ class _Group:
         p.line(1, "}")
 
     def _body(self, loop: Loop) -> None:
-        """Values at a point; each is added to its sum at once, or it would have to be kept."""
+        """Print the values at a point; each is added to its sum at once, to save storage."""
         p = self.p
         sums: dict[Node, list[Node]] = {}
         for s in loop.sums:
@@ -326,14 +326,14 @@ def added_at_once(loop: Loop) -> dict[Node, list[tuple[Node, str, Node]]]:
 
 
 def _values(s: Statement) -> Sequence[Node]:
-    """Values that are known after a statement."""
+    """Values that a statement computes."""
     if isinstance(s, If):
         return s.merged
     return [s if isinstance(s, Node) else s.old]
 
 
 class _Stores:
-    """Outputs in groups of neighbours, each stored as soon as all of its values are known."""
+    """Outputs in groups of neighbours; a group is stored as soon as all its values are computed."""
 
     def __init__(self, p: LanePrinter, targets: Iterable[tuple[str, list[Node]]]) -> None:
         self.p = p
@@ -342,12 +342,12 @@ class _Stores:
         self.waiting: dict[Node, list[int]] = {}
 
     def once(self) -> list[Node]:
-        """Values that stand at one place."""
+        """Values that are stored once."""
         uses = Counter(n for _, nodes in self.targets for n in nodes)
         return [n for n, count in uses.items() if count == 1]
 
     def start(self) -> None:
-        """Print what is known from the beginning."""
+        """Print the stores of values that need no computation."""
         for k, (_, nodes) in enumerate(self.targets):
             needed = [n for n in dict.fromkeys(nodes) if n.op not in FREE]
             self.missing.append(len(needed))

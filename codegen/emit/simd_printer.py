@@ -48,7 +48,7 @@ def wrappers(text: str) -> list[str]:
 
 
 class LanePrinter(Printer):
-    """A printer that knows which values are vectors, and which lanes want what it prints.
+    """Printer of vectors of lanes and of scalars, under the mask of active lanes.
 
     `active` is the mask of these lanes inside a side of a branch; empty where all do.
     """
@@ -149,7 +149,7 @@ class LanePrinter(Printer):
     def _side(
         self, depth: int, assigned: Sequence[Node], k: int, mask: str, inner: Sequence[Statement]
     ) -> None:
-        """One side of a branch, for the lanes that want it; the others keep what they have."""
+        """Print one side of a branch for the lanes of its mask; the others keep their values."""
         outer = self.active
         self.temporaries += 1
         self.active = f"m{self.temporaries}"

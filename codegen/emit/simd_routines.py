@@ -17,7 +17,7 @@ from softehl.codegen.language.definition import Definition
 
 
 def texts(d: Definition, routines: Iterable[Routine]) -> list[str]:
-    """C functions of the routines and what they need, each once, callees first."""
+    """C functions of the routines and their callees, each once, callees first."""
     return c_routines.texts(d, routines, _text)
 
 

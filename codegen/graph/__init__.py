@@ -1,1 +1,1 @@
-"""The expression graph: what it may hold, and its values in many digits."""
+"""Expression graph: operations, derivatives, values in arbitrary precision."""

@@ -25,7 +25,7 @@ PrescribedDerivatives = Mapping[Node, Mapping[Node, Node]]
 
 @dataclass
 class Dependence:
-    """Which nodes depend on chosen ones, given the exceptions of one differentiation."""
+    """Dependence of nodes on selected ones, under the exceptions of one differentiation."""
 
     sources: Collection[Node]
     constant: Collection[Node] = ()
@@ -105,7 +105,7 @@ class _Reverse:
         return self.adjoint
 
     def _hidden(self) -> list[Node]:
-        """Nodes that only a given derivative refers to."""
+        """Nodes that occur only in a prescribed derivative."""
         return [k for pairs in self.depends.prescribed.values() for k in pairs]
 
     def _propagate(self, n: Node, seed: Node) -> None:

@@ -190,9 +190,10 @@ class Divided:
         same: Node | None = None
         for n in reachable(values, stop=other.__contains__):
             if n.op is Op.BRANCH and inside.other[n.args[0]] is not n.args[0]:
-                c, there = n.args[0], inside.other[n.args[0]]
-                both = g.node(Op.AND, (c, there))
-                none = g.node(Op.NOT, (g.node(Op.OR, (c, there)),))
+                c = n.args[0]
+                pair = (c, inside.other[c])
+                both = g.node(Op.AND, pair)
+                none = g.node(Op.NOT, (g.node(Op.OR, pair),))
                 alike = g.node(Op.OR, (both, none))
                 same = alike if same is None else g.node(Op.AND, (same, alike))
         return [list(row) for row in zip(*columns, strict=True)], same

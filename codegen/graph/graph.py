@@ -22,7 +22,7 @@ from typing import Any
 
 
 class Op(StrEnum):
-    """Operations of the graph; `codegen.graph.verifier` says what each may hold."""
+    """Operations of the graph; `codegen.graph.verifier` has the rules for their operands."""
 
     CONST = "const"
     PI = "pi"

@@ -20,7 +20,7 @@ _SEEN_THROUGH = frozenset({Op.NEG, Op.NAME, Op.SUM, Op.ADD, Op.SUB, Op.MUL, Op.B
 
 
 def guarded(g: Graph, a: Node, b: Node) -> Node:
-    """Product that goes inside a branch with a zero side: what is not taken is never evaluated."""
+    """Product inside a branch with a zero side: the side that is not taken is never evaluated."""
     for x, y in ((a, b), (b, a)):
         if x.op is Op.NEG and x.args[0].op is Op.BRANCH:
             return g.neg(guarded(g, x.args[0], y))
@@ -101,7 +101,7 @@ def _product(g: Graph, facts: _Facts, x: Node, y: Node) -> Recursion[Node]:
 
 
 class _Facts:
-    """Uses of the values of one graph, remembered once they are known."""
+    """Facts about the values of one graph, memoised."""
 
     def __init__(self, g: Graph) -> None:
         self.domain = Domain(g)

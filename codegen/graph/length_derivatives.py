@@ -109,7 +109,7 @@ def _is_finite(g: Graph, a: Node) -> Node:
 def _moved(
     g: Graph, roots: Sequence[Node], n: Node, other: Node, fixed: Collection[Node]
 ) -> list[Node]:
-    """Values in which another value stands for a length, without the names that it changes."""
+    """Values with a length replaced by another value, without the names that this changes."""
     new = {n: other}
     for m in reachable(roots, stop=lambda m: m is n or m in fixed):
         if m in new:

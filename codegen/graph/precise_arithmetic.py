@@ -1,4 +1,4 @@
-"""Values of operations in many digits, for the passes (the oracle has a table of its own)."""
+"""Operations in many digits, for the passes (the oracle has a separate table)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Number = Any
 
 
 def arctangent(y: Number, x: Number) -> Number:
-    """Angle of (x, y); mpmath has no words of its own for complex operands."""
+    """Angle of (x, y); mpmath gives no message for complex operands."""
     if isinstance(x, mpmath.mpc) or isinstance(y, mpmath.mpc):
         raise ValueError("atan2 of a complex number")
     return mpmath.atan2(y, x)

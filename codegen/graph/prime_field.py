@@ -18,7 +18,7 @@ DENOMINATOR = 10**100
 
 
 def image(value: Fraction) -> int | None:
-    """A rational number in the field; None where its denominator is zero there."""
+    """Image of a rational number in the field; None if its denominator is zero there."""
     if value.denominator % PRIME == 0:
         return None
     return value.numerator * pow(value.denominator, -1, PRIME) % PRIME

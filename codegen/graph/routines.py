@@ -23,7 +23,7 @@ Pairs = list[tuple[Node, Node]]
 
 @dataclass(frozen=True)
 class LocalisedValues:
-    """Values written in `local` and `external` inputs; `external` are the nodes behind these."""
+    """Values as functions of `local` and `external` inputs, with the nodes of the external ones."""
 
     values: tuple[Node, ...]
     external: tuple[Node, ...]
@@ -105,7 +105,7 @@ def result_index(item: Node) -> int:
 
 @dataclass(frozen=True)
 class Control:
-    """When a local iteration has found its solution; without, it fails after `iterations` steps.
+    """Convergence criterion of a local iteration; it fails after `iterations` steps.
 
     Every equation must be below `tolerance` of the sum of |dg_i/dy * y| over all y that enter it,
     and every step below `tolerance` * (`size` + |s_k|), unless it is rounding: it becomes smaller

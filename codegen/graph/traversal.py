@@ -1,4 +1,4 @@
-"""Walking a graph and building it anew: what lies below some roots, and roots of changed nodes.
+"""Traversal of a graph and its reconstruction with changed nodes.
 
 A model may name ten thousand intermediates, each made of the one before, and Python's stack does
 not hold as many calls.  A recursive function is therefore written as a generator that
@@ -84,7 +84,7 @@ def rewrite(g: Graph, roots: Sequence[Node], rule: Rule) -> list[Node]:
 def strip(
     g: Graph, roots: Sequence[Node], keep: Collection[Node]
 ) -> tuple[list[Node], dict[Node, Node]]:
-    """Roots without names, but for those of `keep`; also where each kept one went."""
+    """Return the roots without names except those of `keep`, and the new node of each of these."""
     new: dict[Node, Node] = {}
     for n in reachable(roots):
         args = tuple(new[a] for a in n.args)

@@ -118,7 +118,7 @@ def sample_file(
 
 
 def patch_file(page: ElementInterface, mesh: Patch, settings: Sequence[float]) -> str:
-    """patch.txt: the mesh, equations of each cell, and what is held."""
+    """Text of patch.txt: mesh, equations of each cell, prescribed values."""
     number, fixed = patch_mesh.numbers(page, mesh), patch_mesh.prescribed(page, mesh)
     width = page.variables
     initial = patch_mesh.starts(page)

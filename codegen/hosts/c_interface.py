@@ -38,7 +38,7 @@ def files(page: ElementInterface, *, single: bool = False) -> tuple[dict[str, st
 
 
 def _private(shared: str) -> str:
-    """Functions that kernels share by name, of this file alone: their lanes are its own."""
+    """Make functions that kernels share static in this file, which has its own lanes."""
     return re.sub(r"^void softehl_pairs_", r"static \g<0>", shared, count=1, flags=re.MULTILINE)
 
 
@@ -79,7 +79,7 @@ def header(page: ElementInterface) -> str:
 
 
 def described(page: ElementInterface) -> str:
-    """Comment with every argument of a page by its place."""
+    """Comment with every argument of a model by its index."""
     d = page.definition
     rows = [f"{page.name}: {d.doc}", ""]
     groups = {"p": d.parameters, "data": d.data, "point data": d.point_data}
@@ -93,7 +93,7 @@ def described(page: ElementInterface) -> str:
 
 @dataclass(frozen=True)
 class Signature:
-    """Outputs of a function, what is handed to its kernel as values and tangent, its meaning."""
+    """Signature of a function: outputs, arguments of its kernel for values and tangent, meaning."""
 
     outputs: str
     values: str
@@ -157,14 +157,14 @@ def _call(page: ElementInterface, task: str) -> str:
 
 
 def table(name: str, values: Iterable[float], kind: str = "static const double") -> str:
-    """A C array of numbers; a single zero where there are none."""
+    """C array of numbers; a single zero for an empty one."""
     texts = [number(v) for v in values] or ["0.0"]
     rows = [f"    {', '.join(texts[k : k + 4])}," for k in range(0, len(texts), 4)]
     return f"{kind} {name}[] = {{\n" + "\n".join(rows) + "\n};\n"
 
 
 def filled(text: str, substitutions: Mapping[str, object]) -> str:
-    """A text with every @word@ replaced; one that is not known is a KeyError.
+    """Replace every @key@ of a template; a missing key is a KeyError.
 
     @finite_numbers@ is a function that several programs need.
     """

@@ -173,7 +173,7 @@ _DIFFERENCES: dict[str, str] = {
 
 
 def example(page: ElementInterface, first: Sample, suffix: str) -> str:
-    """A small program that calls one function for one element and prints what it says."""
+    """Example program that calls one function for one element and prints the result."""
     task = next(t for t in _SIZES if t in page.tasks)
     count = _SIZES[task](page)
     second = f", K[{count**2}]" if task == Task.TANGENT else ""

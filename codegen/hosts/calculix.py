@@ -43,7 +43,7 @@ CALCULIX = Host(material=library)
 
 
 def _names(law: Law) -> dict[str, str]:
-    """Names for ccx, which takes what stands before the first underscore for the library."""
+    """Names for ccx, which reads the library's name before the first underscore."""
     function, library = law.name.upper(), law.name.replace("_", "").upper()
     return {"FUNCTION": function, "LIBRARY": library, "MATERIAL": f"@{library}_{function}"}
 

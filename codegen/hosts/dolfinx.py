@@ -58,7 +58,7 @@ def _substitutions(page: ElementInterface, first: Sample, small: bool) -> dict[s
 
 
 def _state(page: ElementInterface, s: Sample, small: bool) -> dict[str, object]:
-    """A displacement gradient, the state, and what the law must give there."""
+    """Displacement gradient, state, and expected values of the material law."""
     values, old = s.state.dofs, [float(v) for v in s.state.point_data[0]]
     new = [v if k is None else s.fields[k] for k, v in zip(page.renewed, old, strict=True)]
 

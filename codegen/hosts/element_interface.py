@@ -1,4 +1,4 @@
-"""A page as a host sees it: its unknowns by name and node, who fills each argument, its history.
+"""Interface of an element to a host: unknowns by name and node, source of each argument, history.
 
 Every file of `codegen.hosts` reads this record and no other.
 """
@@ -51,7 +51,7 @@ Source = UserInput | TimeStepValue | PreviousValue
 
 @dataclass(frozen=True)
 class ElementInterface:
-    """A page with a fixed number of unknowns; `of` makes it."""
+    """A model with a fixed number of unknowns; `of` makes it."""
 
     definition: Definition
 
@@ -119,7 +119,7 @@ class ElementInterface:
 
     @cached_property
     def nodal(self) -> tuple[NodalUnknown, ...]:
-        """Unknowns that stand at nodes, by name, in the order of the page."""
+        """Nodal unknowns by name, in the order of the model."""
         by_name: dict[str, list[int]] = {}
         for dof, (name, node) in enumerate(self.definition.dof_nodes):
             if node is not None:

@@ -131,7 +131,7 @@ def _sample_file(references: Sequence[Sample]) -> str:
 
 
 def _patch_file(page: ElementInterface) -> str:
-    """A patch of cells: places, numbers of unknowns, and what is held."""
+    """Patch of cells: coordinates, numbers of unknowns, prescribed values."""
     assert page.cell is not None
     mesh = patch_mesh.patch(page.cell)
     number, fixed, initial = (

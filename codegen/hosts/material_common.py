@@ -1,4 +1,4 @@
-"""Shared files of the hosts of materials: words of texts, a cell that tests the law, a block.
+"""Shared files of the hosts of materials: template values, a cell that tests the law, a block.
 
 The cell is a tetrahedron of 4 nodes. The small host has one that asks the law for stress and
 modulus as the program does; it must give the forces and the stiffness of the law in our own cell.
@@ -26,7 +26,7 @@ PULL, TWIST = 0.2, 0.3
 
 
 def substitutions(r: Response, element: str) -> dict[str, object]:
-    """Words of the texts of a host; element: C of the number of the element."""
+    """Values for the templates of a host; element: C expression of the element's number."""
     page = r.page
     outputs = _outputs(r)
     small = r.measure is Measure.SMALL
@@ -96,7 +96,7 @@ def _from_zero(page: ElementInterface) -> ElementInterface:
 
 
 def block(count: int = 2) -> tuple[list[str], list[str], list[str]]:
-    """Lines of a deck: nodes and elements of a distorted block, and what is held on its ends."""
+    """Lines of a deck: nodes and elements of a distorted block, constraints on its ends."""
     mesh = patch_mesh.patch(cells.element("hex8"), count)
     nodes = [f"{n + 1}, {', '.join(map(repr, p))}" for n, p in enumerate(mesh.points)]
     elements = [

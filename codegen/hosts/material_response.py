@@ -1,4 +1,4 @@
-"""A material in the measures of a host: its stress and modulus, derived on the page's own graph.
+"""Response of a material in the measures of a host: stress and modulus from the law's graph.
 
 The deformation moves by six small strains about its value, and the stress of the host is
 differentiated along them: so the modulus is exact, and no formula converts it afterwards.
@@ -67,7 +67,7 @@ class Response:
 
     @property
     def first_law_field(self) -> int:
-        """Number of the first field that is the law's own."""
+        """Index of the first field of the law itself."""
         return 7 + (21 if self.symmetric else 36)
 
     def modulus(self, i: int, j: int) -> int:
@@ -89,7 +89,7 @@ def _written(law: Law, F: Any) -> tuple[Model, Material]:
 
 
 def response(law: Law, measure: Measure) -> Response:
-    """The law in a measure of large strains; a law of small strains in its own."""
+    """Return the law in a measure of large strains; small-strain laws stay in theirs."""
     m = Model(law.name, nodes=1, rule=quadrature.point_rule(), doc=law.doc)
     if is_small(law):
         return _small(law, m)
@@ -137,7 +137,7 @@ def _named(law: Material, stress: Sequence[Any], moduli: Sequence[Sequence[Any]]
 
 
 def _ordered(d: Definition) -> Definition:
-    """The definition with the fields of the law behind those of the host."""
+    """Return the definition with the fields of the law after those of the host."""
     host_field = re.compile(r"W|s\d|C\d\d|skew\d\d")
     fields = sorted(d.fields, key=lambda field: host_field.fullmatch(field[0]) is None)
     return replace(d, fields=tuple(fields))

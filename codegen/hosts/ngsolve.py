@@ -1,4 +1,4 @@
-"""Target `ngsolve`: an integrator of NGSolve on its own spaces, as a Python module."""
+"""Target `ngsolve`: an integrator on the spaces of NGSolve, as a Python module."""
 
 from __future__ import annotations
 
@@ -194,7 +194,7 @@ def _neighbour(points: Sequence[tuple[float, ...]], direction: int) -> int:
 
 
 def _index(points: Sequence[Sequence[float]], point: Sequence[float]) -> int:
-    """Number of the node at a place."""
+    """Index of the node at a point."""
     return next(
         n
         for n, p in enumerate(points)

@@ -119,7 +119,7 @@ def starts(page: ElementInterface) -> list[float]:
 
 
 def prescribed(page: ElementInterface, mesh: Patch) -> list[Held]:
-    """Values held on both sides: of every name that stands at all nodes."""
+    """Prescribed values on both sides, for every name with unknowns at all nodes."""
     full = [k for k, f in enumerate(page.nodal) if len(f.dofs) == page.definition.nodes]
     initial = starts(page)
     first = full[0] if full else -1

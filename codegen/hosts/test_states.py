@@ -1,4 +1,4 @@
-"""States of an element and what its kernel must say there, for the tests in a host's folder.
+"""Test states of an element with reference values, for the tests in a host's folder.
 
 The values are those of the outputs that the compiler printed, evaluated in 30 digits: printing, C
 compiler, processor and the calls of the host are tested by them. Derivatives are not: the tests

@@ -18,7 +18,7 @@ from softehl.codegen.language.nodal_fields import NodalFields
 
 
 class NeedsTraces(ModelError):  # noqa: N818 (named after what it is)
-    """Error of a page on faces that asks for what only facets of cells know, as "quad4_side"."""
+    """Error of a weak form on faces that needs traces of cells, as on "quad4_side"."""
 
     traces = True
 
@@ -28,7 +28,7 @@ class NeedsTraces(ModelError):  # noqa: N818 (named after what it is)
 
 
 class BoundaryModel(NodalFields):
-    """Faces of a mesh, of one dimension less; slopes are those along the parent coordinates."""
+    """Weak form on faces of a mesh; gradients are along the parent coordinates of the face."""
 
     def __init__(
         self, name: str, cell: Element, geometry: str, rule: QuadratureRule, doc: str
@@ -66,20 +66,20 @@ class BoundaryModel(NodalFields):
         return area
 
     def grad(self, value: Any) -> Any:
-        """Refused: faces alone know no gradients."""
+        """Raise `NeedsTraces`: a face has no gradients."""
         raise NeedsTraces(f"grad of {value}")
 
     @property
     def size(self) -> Any:
-        """Refused likewise."""
+        """Raise `NeedsTraces` likewise."""
         raise NeedsTraces("m.size")
 
     def jump(self, value: Any) -> Any:
-        """Refused likewise."""
+        """Raise `NeedsTraces` likewise."""
         raise NeedsTraces(f"m.jump({value})")
 
     def average(self, value: Any) -> Any:
-        """Refused likewise."""
+        """Raise `NeedsTraces` likewise."""
         raise NeedsTraces(f"m.average({value})")
 
     def _derived(self, columns: Sequence[Sequence[Any]], parent: Sequence[Sequence[Any]]) -> Any:

@@ -1,4 +1,4 @@
-"""A page of fields as the model of one whole element of a cell."""
+"""Weak form integrated over one cell."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from softehl.codegen.language.nodal_fields import NodalFields
 
 
 class CellModel(NodalFields):
-    """Values and gradients are sums over nodes, densities are integrated over the cell."""
+    """Model of a cell: values and gradients are sums over nodes, densities are integrated."""
 
     _parent_names = PARENT_NAMES
 

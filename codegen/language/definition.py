@@ -44,7 +44,7 @@ class Component:
 
 @dataclass(frozen=True)
 class Quantity:
-    """Value of a component at the point (axis None), or its slope along an axis."""
+    """Value of a component at the point (axis None), or its derivative along an axis."""
 
     component: Component
     axis: int | None

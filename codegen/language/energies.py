@@ -20,7 +20,7 @@ from softehl.codegen.language.model import Model
 
 @dataclass(frozen=True)
 class Term:
-    """An energy in a model: its value by what it is a function `of`."""
+    """Energy of a model as a function of the variables `of`."""
 
     of: Literal["invariants", "stretches"]
     value: Callable[..., Any]
@@ -32,7 +32,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Energy:
-    """One term: its parameters and what they mean, and its value by variables and parameters."""
+    """Strain energy term: parameters with their meaning, value by variables and parameters."""
 
     parameters: Mapping[str, str]
     value: Callable[..., Any]

@@ -11,7 +11,7 @@ from softehl.errors import SoftehlError
 
 
 class ModelError(SoftehlError, ValueError):
-    """The model says something a kernel cannot hold; the message names it and the page's line.
+    """A model has something that no kernel can hold; the message names it and its line.
 
     `where` is the file and line; left out, it is found among the callers: the first one that is
     not the generator itself (a model that ships is a page like any other). text: without it.
@@ -38,7 +38,7 @@ def page_line() -> str:
 
 
 class ModelWarning(UserWarning):
-    """A page says what is allowed, but seldom meant."""
+    """A model has something that is allowed, but seldom intended."""
 
 
 _WARNED: dict[str | tuple[str, type[Warning], int], int] = {}
@@ -52,7 +52,7 @@ def warn_page(message: str) -> None:
 
 
 class NeedsElement(ModelError):  # noqa: N818 (named after what it is)
-    """Error of a page that asks for what is known in whole elements only."""
+    """Error of a weak form that needs quantities of the whole element."""
 
     def __init__(self, what: str) -> None:
         super().__init__(f"{what}: known in cells only, not on sides and not at a point alone")
@@ -63,9 +63,9 @@ class Empty(ModelError):  # noqa: N818 (named after what it is)
 
 
 class Elsewhere(ModelError):  # noqa: N818 (named after what it is)
-    """A page is not meant for cells, or not for facets; another one of its file may be."""
+    """A weak form is not for cells, or not for facets; another one of its file may be."""
 
     @classmethod
     def no_facet(cls, what: str, cell: str) -> Elsewhere:
-        """For what facets have alone, said on a cell."""
+        """Error for a quantity of facets that a weak form uses on a cell."""
         return cls(f'{what}: {cell} is a cell here; facets are on="interior" and sides of a mesh')

@@ -1,4 +1,4 @@
-"""A page of fields on a facet, seen from the cell on one side of it or from the cells on both.
+"""Weak form on a facet, with the traces of the cell on one side or of the cells on both.
 
 The nodes are those of the first cell, then those of the second. Each cell has its nodes turned so
 that the facet is the first of its faces, and so that corner k of the facet in the first cell is
@@ -29,7 +29,7 @@ FACES = {"tri": "line2", "quad": "line2", "tet": "tri3", "hex": "quad4"}
 
 
 def shape_of(cell: Element) -> str:
-    """Kind of a cell without its number of nodes.  Raises ModelError where there are no traces."""
+    """Shape of a cell without its number of nodes.  Raises ModelError for cells without traces."""
     shape = cell.name.rstrip("0123456789")
     flat = shape == "quad" and len(cell.nodes) <= 25  # kernels of higher orders are large
     if shape not in FIRST or (cell.lines is not None and not flat):
@@ -94,18 +94,18 @@ class FacetModel(NodalFields):
         return entries.arrange([(a + b) / 2 for a, b in pairs])
 
     def finish(self) -> Definition:
-        """The frozen definition.  Raises Elsewhere where nothing is said of the second cell."""
+        """Return the definition.  Raises Elsewhere if nothing refers to the second cell."""
         if self._count > 1 and not self._crossed:
             raise Elsewhere(f"{self.name}: a page on facets between cells has m.jump or m.average")
         return super().finish()
 
     def _beyond(self, entries: Entries) -> list[Any]:
-        """Values of the first cell as they are in the second."""
+        """Values of the first cell, evaluated in the second."""
         self._crossed = True
         return [sp.sympify(v).xreplace(self._others) for v in entries.values]
 
     def _at_facet(self, second: int) -> list[Any]:
-        """Parent place in a cell of the point of the facet."""
+        """Parent coordinates in a cell of the point of the facet."""
         shape = shape_of(self.cell)
         corners, face = FIRST[shape], ELEMENTS[FACES[shape]]
         N, count = face.shape(*self._at), len(corners)

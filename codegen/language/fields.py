@@ -1,4 +1,4 @@
-"""Fields at a point: what a page of fields says, whatever the cell and the geometry.
+"""Fields of a weak form at a point, independent of cell and geometry.
 
 `Fields` adds to a `Model` what such a page needs: fields with values and gradients, a deformation
 gradient of three dimensions, densities and weak forms. Two classes carry it out. `Whole` sums over
@@ -33,7 +33,7 @@ _IN_FIELDS = "a page of fields says it with m.vector, m.scalar and m.minimise or
 
 @dataclass(frozen=True)
 class Traced:
-    """Value of a component at the point, and its slopes along the axes."""
+    """Value of a component at the point, and its gradient."""
 
     component: Component
     value: Any
@@ -506,7 +506,7 @@ class Fields(Model):
 
 
 def _leaves(expression: Any) -> set[Any]:
-    """Symbols of an expression that stand for nothing else."""
+    """Symbols of an expression without a definition."""
     symbols = expression.free_symbols
     return {s for s in symbols if getattr(s, "definition", None) is None}
 

@@ -60,7 +60,7 @@ class Entries:
 
 
 class Listed(list[Any]):
-    """A list of a page; an index that is too large is an error that says how many there are."""
+    """List of a model; an index that is too large is an error with the length of the list."""
 
     def __init__(self, values: Iterable[Any] = (), what: str = "the list") -> None:
         super().__init__(values)
@@ -76,7 +76,7 @@ class Listed(list[Any]):
 
 
 def applied(name: str, function: Callable[..., Any], *arguments: Any, write: str = "") -> Any:
-    """Value of a function of a page, or an error that says how many arguments it gets.
+    """Call a function of a model; a wrong number of arguments is an error that states it.
 
     write: what to write instead; a lambda where it is left out.
     """

@@ -1,4 +1,4 @@
-"""A material by itself: an energy or a stress as a function of the deformation.
+"""Material laws: an energy or a stress as a function of the deformation.
 
     @softehl.material
     def neo(m):

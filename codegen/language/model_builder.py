@@ -226,7 +226,7 @@ def _columns(what: str, names: Sequence[str], columns: Sequence[Sequence[Any]]) 
 
 
 class Equations:
-    """Potentials with what they freeze, and what their integrands are measured by."""
+    """Potentials with their frozen quantities, and the measures of their integrals."""
 
     def __init__(self, symbols: Symbols) -> None:
         self._symbols = symbols
@@ -283,7 +283,7 @@ class Equations:
         self._potentials.append((value, frozen))
 
     def total(self) -> tuple[Node, tuple[Node, ...]]:
-        """The sum of all potentials and weak forms, and what is frozen in it."""
+        """Sum of all potentials and weak forms, and its frozen quantities."""
         model = self._symbols.model
         if not self._potentials:
             raise Empty(f"model {model} has neither a potential nor a weak form")
@@ -398,7 +398,7 @@ class Outputs:
 
     @property
     def tasks(self) -> tuple[str, ...] | None:
-        """The chosen tasks, with the product where it is asked for beside them."""
+        """Selected tasks, with the product if it is requested."""
         if self._tasks is not None and self.product:
             return (*self._tasks, Task.PRODUCT)
         return self._tasks
@@ -470,7 +470,7 @@ LONGEST = 200
 
 
 class ModelBuilder:
-    """Owner of the parts of a model; `Model` adds what a page may say."""
+    """Owner of the parts of a model; `Model` adds the user's methods."""
 
     _unused = 'its residual is zero; if that is meant, say idle=["..."] in m.nodal_unknowns'
 

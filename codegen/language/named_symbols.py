@@ -58,7 +58,7 @@ def named(
 
 
 def _direct(value: Any) -> set[Any]:
-    """Symbols and names of an expression, without those that its names stand for."""
+    """Symbols and names of an expression, without those inside the definitions of its names."""
     if not isinstance(value, sp.Basic):
         return set(value.free_symbols)
     names, seen, waiting = set(), set(), [value]
@@ -85,7 +85,7 @@ def _refuse_truth(symbol: Any, other: object) -> None:
 
 
 class UnseenError(ModelError):
-    """A page asks SymPy for what lies behind a name without a definition."""
+    """A model asks SymPy for the expression of a name without a definition."""
 
 
 class Name(sp.Symbol):  # type: ignore[misc]
@@ -260,7 +260,7 @@ class ExpandedName(sp.Expr):  # type: ignore[misc]
 
     @property
     def definition(self) -> Any:
-        """Expression that the label stands for."""
+        """Expression that defines the label."""
         return self.args[1]
 
     @property

@@ -60,7 +60,7 @@ class NodalFields(Fields):
         return self._symbols.input("parent_weight", "rule", self.rule.dimension, varying=True)
 
     def finish(self) -> Definition:
-        """The frozen definition, which knows its cell."""
+        """Return the definition with its cell."""
         return replace(super().finish(), cell=self.cell.name)
 
     def _element(self, order: int) -> Element:

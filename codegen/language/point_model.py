@@ -1,4 +1,4 @@
-"""A page of fields at one point: values and gradients are the unknowns of a model of their own.
+"""Weak form at one point: a model whose unknowns are values and gradients.
 
 Its residual is the fluxes, its tangent the moduli; nothing of a cell is in it but its dimension.
 """
@@ -23,7 +23,7 @@ from softehl.codegen.language.flatten import Entries
 
 
 class PointModel(Fields):
-    """Values and gradients are unknowns, densities are per volume and stay what they are."""
+    """Model of a point: values and gradients are unknowns, densities are per volume."""
 
     def __init__(self, name: str, cell: Element, geometry: str, doc: str) -> None:
         super().__init__(name, cell, geometry, 1, point_rule(), doc)
@@ -101,11 +101,11 @@ class PointModel(Fields):
         return self.define(name, density)
 
     def point_data(self, /, **meanings: str) -> list[sp.Symbol]:
-        """As of any model; here they do not vary, there is one point."""
+        """Declare point data; they do not vary, as there is one point."""
         return self._arguments.declare("point data", meanings)
 
     def _check_use(self, potential: Node) -> None:
-        """Nothing: which values and gradients occur is what is found out here."""
+        """Accept unused values and gradients: which of them occur is the result."""
 
 
 def _index(n: Node) -> int:

@@ -225,7 +225,7 @@ class Lowering:
         return (yield self._lower(value))
 
     def _decided(self, condition: Node, value: Node) -> Node:
-        """`value`, or not-a-number where its condition compares what is not-a-number.
+        """`value`, or not-a-number where its condition compares not-a-number.
 
         The power of three is so in the first and second derivatives, too.
         """
@@ -320,7 +320,7 @@ class Symbols:
         return {str(s) for s, n in self.bound.items() if n.op is Op.INPUT}
 
     def label_of(self, node: Node) -> str | None:
-        """Label of the first symbol that stands for a node."""
+        """Label of the first symbol of a node."""
         return next((str(s) for s, n in self.bound.items() if n is node), None)
 
     def input(self, label: str, array: str, index: int, *, varying: bool = False) -> sp.Symbol:
@@ -345,7 +345,7 @@ class Symbols:
         return Entries(symbols, like.suffixes, like.arrange).shaped()
 
     def placeholders(self, label: str, symbols: Entries) -> list[Node]:
-        """Inputs that stand for local unknowns while their equations are written."""
+        """Inputs in place of local unknowns while their equations are recorded."""
         nodes = [self.graph.input(f"local {label}", k) for k in range(len(symbols.values))]
         self.bound.update(zip(symbols.values, nodes, strict=True))
         return nodes
@@ -373,7 +373,7 @@ _KINDS = {
 
 
 def _kind(node: Node) -> str:
-    """What a name stands for, in words."""
+    """Kind of a named quantity, for messages."""
     if not isinstance(node.payload, Input):
         return "an intermediate"
     return _KINDS.get(node.payload.array, node.payload.array)

@@ -46,7 +46,7 @@ class Principal:
 
 @dataclass(frozen=True)
 class Slope:
-    """Derivative of `value` by the quantity that a symbol stands for."""
+    """Derivative of `value` by the quantity of a symbol."""
 
     value: Any
     by: Any
@@ -54,7 +54,7 @@ class Slope:
 
 @dataclass
 class SympyTape:
-    """The page: what each name means, potentials with what they freeze, fields, history.
+    """Record of a model: definitions of names, potentials with frozen quantities, fields, history.
 
     `inputs` holds array and index of every argument; names not in `meanings` are arguments.
     """

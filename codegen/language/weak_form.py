@@ -31,7 +31,7 @@ Form = Literal["whole", "point"]
 
 
 class PlaceError(ModelError):
-    """A page of fields cannot stand there; no line of it is wrong."""
+    """A weak form cannot be used on this cell; no line of it is wrong."""
 
     def __init__(self, message: str) -> None:
         ValueError.__init__(self, message)

@@ -167,7 +167,7 @@ def _segment(name: str, doc: str, law: rheology.Law, *, rough: bool) -> Definiti
 
 
 def _one_subcell() -> QuadratureRule:
-    """Two Gauss points with the ends of their subcell beside them, here those of the segment."""
+    """Two Gauss points with the bounds of their subcell, here those of the segment."""
     line = quadrature.gauss(2, 1)
     bounds = -sp.Integer(1), sp.Integer(1)
     return QuadratureRule(3, tuple((*point, *bounds) for point in line.points), line.weights)

@@ -178,7 +178,7 @@ def _area(nodes: int, xi: Any, x: _Sides, ring: Any) -> Any:
 
 
 def _projected(m: Model, slave: _Sides, other: _Sides, end: int) -> Any:
-    """Place on the side, -1 to 1, from where a line goes through an end of the other one."""
+    """Parent coordinate on the slave side whose normal passes through an end of the other."""
     y, nodes = [c[end] for c in other], len(slave[0])
     chord = [(c[1] - c[0]) / 2 for c in slave]
     offset = [y[k] - (slave[k][0] + slave[k][1]) / 2 for k in (0, 1)]
@@ -198,7 +198,7 @@ def _inside(xi: Any) -> Any:
 
 
 def _partner(m: Model, other: _Sides, at: Sequence[Any], t: Sequence[Any]) -> Any:
-    """Place on the other side at which a line across t through a place ends."""
+    """Parent coordinate on the other side where the line across t through a point ends."""
     half = sp.Rational(1, 2)
     along = m.define("against", sum(half * (c[1] - c[0]) * t[k] for k, c in enumerate(other)))
     if len(other[0]) == 2:

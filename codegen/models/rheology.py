@@ -34,7 +34,7 @@ _TERMS = 11  # of a power series in Sigma^2 <= 1: the first that is left out is 
 
 
 def _full(value: Any) -> Any:
-    """The part of oil where there is nothing else."""
+    """Oil fraction of a full film."""
     return value
 
 

@@ -63,7 +63,7 @@ def insert(g: Graph, row: Row, value: Node, sign: int) -> None:
 
 
 def _rows_with(rows: Sequence[Row]) -> dict[Node, set[int]]:
-    """The rows in which each term stands."""
+    """Rows that contain each term."""
     at: dict[Node, set[int]] = {}
     for k, row in enumerate(rows):
         for n in row:
@@ -72,7 +72,7 @@ def _rows_with(rows: Sequence[Row]) -> dict[Node, set[int]]:
 
 
 def _bundle(g: Graph, rows: Sequence[Row], at: dict[Node, set[int]]) -> None:
-    """Sum the terms that stand in the same rows with the same signs relative to each other."""
+    """Sum the terms that occur in the same rows with the same relative signs."""
     groups: dict[tuple[tuple[int, int], ...], list[Node]] = {}
     for n, rows_with in at.items():
         if len(rows_with) > 1:

@@ -21,7 +21,7 @@ def uses(roots: Sequence[Node]) -> Counter[Node]:
 
 
 def chain(n: Node, ops: tuple[Op, ...], counted: Counter[Node]) -> list[Node]:
-    """Operands of a chain of `ops` whose inner results nobody else uses."""
+    """Operands of a chain of `ops` whose inner results have no other use."""
     out: list[Node] = []
     stack = [*reversed(n.args)]
     while stack:
@@ -96,7 +96,7 @@ def _signed(n: Node, sign: int) -> list[tuple[int, Node]]:
 
 
 def _as_it_was(g: Graph, n: Node, new: dict[Node, Node]) -> Node:
-    """A sum keeps its order unless there is something to gain: order is rounding."""
+    """Keep the order of a sum unless operations are saved: its order decides the rounding."""
     return g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
 
 

@@ -73,7 +73,7 @@ class _Values:
         return self.conditions[a] & ~self.conditions[b] == 0
 
     def add(self, n: Node) -> None:
-        """Value and conditions of a node whose operands are there."""
+        """Value and conditions of a node whose operands have theirs."""
         below = 0
         for a in n.args:
             below |= self.conditions[a]

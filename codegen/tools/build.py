@@ -71,7 +71,7 @@ def signature(directory: Path) -> str:
 
 
 def intact(directory: Path) -> bool:
-    """True if the library there is whole and was built from the sources there; never loads it."""
+    """True if the library is undamaged and built from the sources beside it; never loads it."""
     try:
         data = (directory / LIBRARY).read_bytes()
         recorded = (directory / DIGEST).read_text(encoding="ascii").split()
@@ -169,7 +169,7 @@ def _shared(source: Path, text: str, command: Sequence[str], flags: Sequence[str
 
 
 def tuned() -> tuple[tuple[str, ...], str]:
-    """Flags for this processor, as far as the compiler knows it, and its `identification`."""
+    """Flags for this processor if the compiler supports it, and its `identification`."""
     try:
         return FLAGS, identification(FLAGS)
     except NoCompilerError:

@@ -67,7 +67,7 @@ def fault(folder: Path) -> str:
 
 
 def configured() -> Path:
-    """Wanted place of the cache.  Raises `CacheError` where there is no home folder."""
+    """Folder of the cache.  Raises `CacheError` if there is no home folder."""
     variable = os.environ.get("SOFTEHL_CACHE")
     try:
         if variable:

@@ -27,7 +27,7 @@ from functools import cache
 from pathlib import Path
 
 from softehl.codegen.tools import cache_dir
-from softehl.codegen.tools.cache_dir import CacheError, own, root, writable
+from softehl.codegen.tools.cache_dir import CacheError, require_own, root, writable
 from softehl.codegen.tools.model_text import digest_of
 
 try:
@@ -81,11 +81,11 @@ def remember(key: str, files: Files, read: Mapping[str, str] | None = None) -> N
     """
     stored = {"content": content(files), "files": dict(files), "read": dict(read or {})}
     text = json.dumps(stored)
-    write(own(root() / "derived") / f"{key}.json", text.encode(), mode=0o644)
+    write(require_own(root() / "derived") / f"{key}.json", text.encode(), mode=0o644)
 
 
 def write(path: Path, data: bytes, mode: int = 0o666) -> None:
-    """Write a file under a temporary name and move it into place, safe against a power cut.
+    """Write a file atomically: under a temporary name, then renamed; safe against a power cut.
 
     Raises OSError with the name of the file.
     """
@@ -135,7 +135,7 @@ def folder(
     existing = _existing(key, usable)
     if existing is not None:
         return existing
-    built = own((writable() if keep else root()) / "built")
+    built = require_own((writable() if keep else root()) / "built")
     target = built / key
     with _alone(built / f".lock-{key}"):
         if not usable(target):
@@ -150,7 +150,7 @@ def folder(
 def _existing(key: str, usable: Callable[[Path], bool]) -> Path | None:
     """The folder of a key in a cache that need not be writable."""
     try:
-        built = cache_dir.wanted() / "built"
+        built = cache_dir.configured() / "built"
         safe = not any(map(cache_dir.fault, (built.parent, built)))
     except (CacheError, OSError):
         return None
@@ -193,7 +193,7 @@ def _synchronise(folder: Path) -> None:
 
 
 def _publish(scratch: Path, target: Path, complete: Callable[[Path], bool]) -> None:
-    """Move a finished folder to its place, unless another process was first."""
+    """Rename a finished folder to its target, unless another process was first."""
     while True:
         try:
             os.rename(scratch, target)
@@ -223,7 +223,7 @@ def _scratch(parent: Path) -> Iterator[Path]:
 
 
 def _sweep(parent: Path) -> None:
-    """Remove what processes that were killed more than a day ago left behind."""
+    """Remove temporary folders of processes that were killed more than a day ago."""
     for path in parent.glob(f"{_SCRATCH}*"):
         with suppress(OSError):
             if time.time() - path.stat().st_mtime > _DAY:

@@ -1,4 +1,4 @@
-"""`softehl generate`: what is wrong is said in one line on stderr, with exit code 2."""
+"""Command `softehl generate`: errors are one line on stderr, with exit code 2."""
 
 from __future__ import annotations
 

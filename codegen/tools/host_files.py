@@ -75,7 +75,7 @@ def _states(d: Definition) -> list[State]:
 
 
 def write(folder: Path, texts: Mapping[str, str]) -> None:
-    """Write files; raises `ModelFileError` for a folder that holds files of somebody else."""
+    """Write files; raises `ModelFileError` for a folder with files that softehl did not write."""
     notes = folder / NOTES
     generated = notes.is_file() and MARK in notes.read_text(encoding="utf-8", errors="replace")
     foreign = (

@@ -1,4 +1,4 @@
-"""Imports of a model file from its own folder, and a record of all that its run has read.
+"""Imports of a model file from its folder, and a record of all files that its run reads.
 
 A model imports its neighbours as a script does, but as they are on the disk now, whatever the
 process has imported before: their modules exist for the time of the run only. The record says
@@ -43,7 +43,7 @@ class Inputs:
     foreign: set[str] = field(default_factory=set)
 
     def beyond(self, path: Path, sources: Mapping[str, str]) -> dict[str, str] | None:
-        """Digests of what was read beside the `model_text.sources` of a file as they were known.
+        """Digests of the files that were read, except the `sources` of the model file.
 
         None where that does not say it all: a file was edited between its digest and its run, or a
         module came from elsewhere.
@@ -65,7 +65,7 @@ _ONE = threading.RLock()
 
 @contextmanager
 def imports_from(folder: Path) -> Iterator[Inputs]:
-    """Let a model import its neighbours, and put the modules back that were there before."""
+    """Let a model import from its folder, and restore the previous modules afterwards."""
     with _ONE, _isolated(folder) as inputs:
         yield inputs
 

@@ -161,7 +161,7 @@ def library(
     *,
     check: bool = True,
 ) -> Library:
-    """The library of some models; what was derived is remembered under `key` as well.
+    """Library of some models; the derived C is stored under `key` as well.
 
     read: as in `cache.remember`. check: with the quick check of kernels that have not been through
     it (`verify.quick_check`).
@@ -250,13 +250,13 @@ _CODEGEN = Path(__file__).parents[1]
 
 @cache
 def generator() -> str:
-    """Digest of the generator itself: its text and the versions of what it computes with."""
+    """Digest of the generator: its text and the versions of SymPy and mpmath."""
     texts = [p.read_text(encoding="utf-8") for p in sorted(_CODEGEN.rglob("*.py"))]
     return store.digest(*texts, *(version(p) for p in ("sympy", "mpmath")))
 
 
 def fingerprint(definition: Definition) -> str:
-    """Digest of everything that a definition says, its graphs included."""
+    """Digest of the content of a definition, with its graphs."""
     return store.digest(_canonical_text(definition), _canonical_text(definition.point))
 
 
@@ -280,7 +280,7 @@ def _counts(f: Field[Any]) -> bool:
 
 
 def _entries(value: Any, label: Callable[[Node], str]) -> str:
-    """A value as text, nodes as `label`.
+    """A value as text, nodes by their `label`.
 
     Fields that a record keeps for itself (_name) or does not compare are left out.
     """

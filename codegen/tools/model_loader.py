@@ -1,4 +1,4 @@
-"""Models of a user's own file.
+"""Loader of the models in a user's file.
 
 A model file is ordinary Python and is *run* to obtain its models: run only files you trust, as you
 would with any script.  Its models are
@@ -78,7 +78,7 @@ def pages(path: Path, on: On = NOWHERE) -> list[Definition | Law]:
 def _pages_and_inputs(
     path: Path, on: On, *, by_itself: bool
 ) -> tuple[list[Definition | Law], Inputs]:
-    """Models, with materials by themselves or as bodies where there is nothing else."""
+    """Models of a file; its materials as laws, or as bodies if it has no models."""
     path = path.resolve()
     text = read(path)
     with imports_from(path.parent) as inputs, _errors_of(path):
@@ -195,7 +195,7 @@ def _makes_a_model(module: ModuleType, value: Any) -> bool:
 
 
 def _make_all(entries: Iterable[Any], on: On) -> list[Definition | Law]:
-    """All models that stand there.  Raises Elsewhere where none of the pages does."""
+    """All models that fit the cell.  Raises Elsewhere if none does."""
     made: list[Definition | Law] = []
     refused: list[Elsewhere] = []
     for entry in entries:
@@ -235,7 +235,7 @@ def errors_of(page: Page) -> Iterator[None]:
 
 @contextmanager
 def _errors_of(path: Path) -> Iterator[None]:
-    """Say in one line, with the model's own line, what went wrong while it ran."""
+    """Report an exception of a model in one line, with the line of the model."""
     try:
         yield
     except ModelFileError:
@@ -267,7 +267,7 @@ def _errors_of(path: Path) -> Iterator[None]:
 
 
 def _line(path: Path, error: BaseException) -> tuple[str, str]:
-    """File and line of the innermost frame that stands in the model's folder, and its text."""
+    """File, line and text of the innermost frame in the folder of the model."""
     frames = traceback.extract_tb(error.__traceback__)
     in_folder = [f for f in frames if Path(f.filename).is_relative_to(path.parent)]
     if not in_folder:

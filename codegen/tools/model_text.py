@@ -30,7 +30,7 @@ def shortened(path: Path) -> str:
 
 
 def sources(path: Path) -> dict[str, str]:
-    """Text of the file and of all that it imports from its own folder, by relative name.
+    """Text of the file and of all its imports from its folder, by relative name.
 
     Found by reading the import statements; nothing is run.
     """

@@ -26,7 +26,7 @@ def folder() -> Path:
 
 
 def main() -> int:
-    """Print the path of the library, or say in one line why there is none."""
+    """Print the path of the library, or one line with the reason why there is none."""
     try:
         print(folder() / build.LIBRARY)
     except NoCompilerError as error:

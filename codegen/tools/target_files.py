@@ -1,4 +1,4 @@
-"""`softehl generate --target`: the C of another target, in a folder of its own.
+"""Command `softehl generate --target`: the C of another target, in a separate folder.
 
 `generated/` holds target `simd` only, so that what is checked in has one meaning.
 """

@@ -1,4 +1,4 @@
-"""`softehl generate my_model.py ...`: kernels of a user's own models, compiled and checked.
+"""Command `softehl generate my_model.py ...`: kernels of a user's models, compiled and checked.
 
 The kernels of `folder/my_model.py` go to `folder/generated/my_model/`; with `--out DIR` those of
 all named files go together to DIR.  Such a folder holds nothing else and can be made anew.
@@ -38,7 +38,7 @@ SAMPLES = 5
 
 
 def nanoseconds(d: Definition, tasks: Iterable[str], library: Path) -> dict[str, float]:
-    """Nanoseconds of one element by task; `samples.NoStateError` if no state is found."""
+    """Nanoseconds of one element by task; NoStateError if no state is found."""
     (state,) = random_states.admissible(d, 1)
     along = [1.0] * len(state.dofs)
     batch = Batch(d, ctypes.CDLL(str(library)), [state] * ELEMENTS, [along] * ELEMENTS)

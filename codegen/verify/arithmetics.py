@@ -130,12 +130,12 @@ class Rounded(Exact):
     """As `Exact`, with a rounding error in every operation and the range of doubles."""
 
     def settled(self, slot: int, function: Function) -> Function:
-        """The function with an error of its own."""
+        """The function with a relative rounding error."""
         error = _error(slot, 0)
         return lambda *args: _in_range(function(*args) * error)
 
     def eigenvalues(self, a: Sequence[Number]) -> list[Number]:
-        """Each with an error of its own, which counts where they are nearly equal."""
+        """Eigenvalues with separate rounding errors, which matter where they are nearly equal."""
         return [v * _error(k, 3) for k, v in enumerate(super().eigenvalues(a))]
 
     def sum(self, slot: int, count: int) -> Function:

@@ -80,7 +80,7 @@ class Report:
 
 
 class Comparison:
-    """The kernels of one family beside the page `written`; what was found is in `report`."""
+    """Comparison of the kernels of one family with the model `written`; results are in `report`."""
 
     def __init__(
         self, d: Definition, written: Definition, library: Path, deadline: float = math.inf
@@ -123,7 +123,7 @@ class Comparison:
         self._at(called, 0, [self._direction()], tasks, far=True)
 
     def _combs(self) -> list[Vector]:
-        """Each row on its own up to `ROWS`; else so many sums of rows that lie `ROWS` apart."""
+        """Single rows up to `ROWS` of them; else `ROWS` sums of rows with that stride."""
         if self.size <= ROWS:
             return [[float(i == k) for i in range(self.size)] for k in range(self.size)]
         factors = self._direction()
@@ -305,7 +305,7 @@ def finite(error: float) -> float:
 
 
 def _double(v: Any) -> float:
-    """A number as a double; beyond their range there is none."""
+    """A number as a double; `NotRealError` beyond their range."""
     value = float(v)
     if math.isinf(value):
         raise NotRealError

@@ -119,7 +119,7 @@ class Oracle:
 
 
 def _varied(state: State, step: Number, direction: Sequence[Number]) -> State:
-    """A state whose coordinates, data, parameters and (if there are more) dofs have moved."""
+    """State displaced along a direction of coordinates, data, parameters and optionally dofs."""
     moved, entries = {}, list(direction)
     for array in ("coordinates", "data", "parameters", "dofs"):
         values = exact(getattr(state, array))

@@ -73,7 +73,7 @@ class Batch:
         return varied + (self.along[e] if task == abi.Task.FIELDS_RATE else [])
 
     def silent(self, task: str, *, first: bool = False) -> bool:
-        """True if a model with routines is not-a-number in a whole element, which says no.
+        """True if a model with routines gives not-a-number in a whole element: no local solution.
 
         In any element, or in the first one.
         """

@@ -1,4 +1,4 @@
-"""The check of a kernel that nobody asked to check: a few calls of it, before it is first used.
+"""Quick check of a kernel before its first use: a few calls, compared with differences.
 
 `softehl generate` compares kernels with their pages in 90 digits (`verification`), which takes
 seconds.  Here a kernel is compared with itself, at ordinary states: all tasks are numbers, the
@@ -65,7 +65,7 @@ def check(d: Definition, tasks: Sequence[str], library: Path) -> None:
 
 
 def _direction(states: Sequence[State]) -> Vector:
-    """A direction that moves every unknown by about its size."""
+    """Direction that changes every unknown by about its size."""
     sizes = [
         max(map(abs, map(float, u))) or 1.0 for u in zip(*(s.dofs for s in states), strict=True)
     ]
@@ -79,7 +79,7 @@ def _moved(state: State, h: float, direction: Vector) -> State:
 
 
 def _contradictions(batch: Batch, tasks: Sequence[str], direction: Vector) -> Iterator[str]:
-    """Tasks that are no slopes of others."""
+    """Tasks that disagree with the differences of others."""
     n = len(direction)
     if Task.ENERGY in tasks and Task.RESIDUAL in tasks:
         rows = [batch.call(Task.RESIDUAL)[0][0]]

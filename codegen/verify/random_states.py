@@ -138,7 +138,7 @@ def _fields(d: Definition) -> list[str]:
 
 
 def _linear(xi: float, fields: int) -> list[tuple[float, ...]]:
-    """Values and slopes of the two linear shape functions of each field, zero for the others."""
+    """Values and derivatives of the linear shape functions of each field, zero for the others."""
     shapes = ((1 - xi) / 2, -0.5), ((1 + xi) / 2, 0.5)
     none = (0.0, 0.0)
     return [

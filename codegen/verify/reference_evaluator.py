@@ -44,7 +44,7 @@ class NotRealError(ArithmeticError):
 
 @dataclass(frozen=True)
 class Operation:
-    """A step with the function of its operands; None: a step with an evaluation of its own."""
+    """A step with the function of its operands; None: a step with a special evaluation."""
 
     step: Step
     function: Function | None
@@ -57,7 +57,7 @@ class Evaluator:
         self.program, self.arithmetic, self.deadline = program, arithmetic, deadline
         self._operations: dict[int, Operation] = {}
         self._inner: dict[int, list[Operation]] = {}
-        self._chosen: dict[Any, list[Operation]] = {}
+        self._selected: dict[Any, list[Operation]] = {}
         slots = [slot for slot, _ in program.potentials]
         self.order = self.operations(program.above([*slots, *program.fields]))
 
@@ -77,10 +77,10 @@ class Evaluator:
     def depending(self, arrays: frozenset[str], roots: tuple[int, ...]) -> list[Operation]:
         """The operations that `roots` need and that depend on some arrays."""
         key = (arrays, roots)
-        if key not in self._chosen:
+        if key not in self._selected:
             steps = self.program.above(roots)
-            self._chosen[key] = self.operations([s for s in steps if s.depends & arrays])
-        return self._chosen[key]
+            self._selected[key] = self.operations([s for s in steps if s.depends & arrays])
+        return self._selected[key]
 
     def at(self, state: State) -> Evaluation:
         """All values at a state."""
@@ -338,7 +338,7 @@ class Evaluation:
         roots: tuple[int, ...],
         frozen: Sequence[int] = (),
     ) -> Evaluation:
-        """Values of `roots` where arrays have moved, what is `frozen` held; all others are old."""
+        """Values of `roots` for changed arrays; `frozen` quantities keep their values."""
         made = Evaluation.__new__(Evaluation)
         made.evaluator, made.state = self.evaluator, self.state
         made.rows = [list(row) for row in self.rows]

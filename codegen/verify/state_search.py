@@ -88,7 +88,7 @@ class StateSearch:
         yield from (f.state for f in self.pool[:FAR])
 
     def text(self, target: Target) -> str:
-        """A target in words."""
+        """Description of a target."""
         number, side = target
         switch = self.program.switches[number]
         text = switch.text if len(switch.text) < 60 else switch.text[:57] + "..."
@@ -164,7 +164,7 @@ class StateSearch:
         return [v + scale * (self._size(k, v) or 1) * self.rng.uniform(-1, 1) for k, v in pairs]
 
     def _linear(self, s: State, scale: float) -> list[float]:
-        """Unknowns of one name as a linear field of their nodes' places."""
+        """Unknowns of one name as a linear field over the nodes."""
         width = len(self.d.coordinates)
         extent = max(
             [abs(float(a) - float(b)) for a in s.coordinates for b in s.coordinates] or [1]
@@ -349,7 +349,7 @@ _RELATIONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": opera
 
 
 def _allowed(d: Definition, s: State) -> bool:
-    """True if the page's own conditions on parameters and data hold."""
+    """True if the conditions of the model on parameters and data hold."""
     named = {a.name: v for a, v in zip(d.parameters, s.parameters, strict=True)}
     named |= {a.name: v for a, v in zip(d.data, s.data, strict=True)}
     return all(_RELATIONS[c.relation](named[c.name], c.bound) for c in d.conditions)

@@ -34,7 +34,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Shape:
-    """Values [point][node] and slopes [point][node][direction] of shape functions of an order.
+    """Shape functions of an order: values [point][node], derivatives [point][node][direction].
 
     line: for cells that are products of lines, under a rule that is a product too. long: whether
     tables of the cell would be long, so that loops multiply what they need from those of the line.
@@ -86,7 +86,7 @@ def shape(order: int, cell: Element, rule: QuadratureRule) -> Shape:
 
 
 def constant(points: int, dimension: int) -> Shape:
-    """The one shape function of what is the same in the whole cell."""
+    """Shape function of a field that is constant in the cell."""
     return Shape(0, ((1.0,),) * points, (((0.0,) * dimension,),) * points, None)
 
 
@@ -136,7 +136,7 @@ def _line(cell: Element, rule: QuadratureRule) -> Line | None:
 
 
 def _products(line: Line, dimension: int) -> tuple[Any, Any]:
-    """Values and slopes of the products of a line's shape functions."""
+    """Values and derivatives of the products of a line's shape functions."""
     values, derivatives = [], []
     for point in product(range(len(line.values)), repeat=dimension):
         directions = (-1, *range(dimension))  # -1: the value
@@ -151,7 +151,7 @@ def _products(line: Line, dimension: int) -> tuple[Any, Any]:
 
 
 def _derivative_table(name: str, line: Line) -> str:
-    """Table NAME of slopes [point][node][direction] of products, which the C compiler multiplies.
+    """Table NAME of derivatives [point][node][direction] of products; the C compiler multiplies.
 
     For a cell of 27 nodes that is a twentieth of the text of the numbers.
     """

@@ -24,19 +24,19 @@ STEM = "pairs_"
 
 @dataclass(frozen=True, eq=False)
 class Parent:
-    """Moduli by values and parent slopes: the array S of a point."""
+    """Moduli by values and parent gradients: the array S of a point."""
 
     layout: Layout
     outputs: PointOutputs
 
     @property
     def symmetric(self) -> bool:
-        """True if the upper triangle alone is there."""
+        """True if only the upper triangle is stored."""
         return self.outputs.symmetric
 
     @cached_property
     def moduli(self) -> dict[tuple[Quantity, Quantity], str]:
-        """Moduli at the point by what they multiply, as the function gives them; both triangles."""
+        """Moduli at the point by row and column, from the function of the point; both triangles."""
         q, by_pair = self.layout.form.cell_quantities, {}
         for k, (i, j) in enumerate(self.outputs.moduli):
             if j not in q:
@@ -59,7 +59,7 @@ class Parent:
 
     @cached_property
     def blocks(self) -> dict[tuple[Component, bool, Component, bool], list[tuple[Quantity, ...]]]:
-        """Entries of the moduli by components and whether they are slopes; none is empty."""
+        """Nonempty blocks of the moduli by component and whether it is a gradient."""
         by_block: dict[tuple[Component, bool, Component, bool], list[tuple[Quantity, ...]]] = {}
         for row, column in self.moduli:
             key = (row.component, row.axis is not None, column.component, column.axis is not None)
@@ -68,7 +68,7 @@ class Parent:
 
     @cached_property
     def quantities(self) -> list[Quantity]:
-        """Values and parent slopes of the components, in the order of the page."""
+        """Values and parent gradients of the components, in the order of the weak form."""
         parent_quantities: dict[Quantity, None] = {}
         for q in self.layout.form.cell_quantities.values():
             axes = [None] if q.axis is None else range(self.layout.dimension)
@@ -80,7 +80,7 @@ class Parent:
 
     @cached_property
     def numbers(self) -> dict[tuple[Quantity, Quantity], int]:
-        """Place in S of what is not zero."""
+        """Indices in S of the nonzero entries."""
         entry_numbers: dict[tuple[Quantity, Quantity], int] = {}
         for n, row in enumerate(self.quantities):
             for column in self.quantities[n if self.symmetric else 0 :]:
@@ -95,17 +95,17 @@ class Parent:
         return max(len(self.numbers), 1)
 
     def number(self, row: Quantity, column: Quantity) -> int | None:
-        """Place in S of an entry of both triangles."""
+        """Index in S of an entry of either triangle."""
         mirrored = (column, row) if self.symmetric else (row, column)
         return self.numbers.get((row, column), self.numbers.get(mirrored))
 
     def of(self, c: Component) -> list[Quantity]:
-        """Value and parent slopes of a component."""
+        """Value and parent gradient of a component."""
         return [q for q in self.quantities if q.component == c]
 
 
 def pulled_back(out: Lines, layout: Layout, outputs: PointOutputs) -> None:
-    """S of the point q: w T A T^T, where T turns slopes into parent slopes."""
+    """Write S of the point q: w T A T^T, where T turns gradients into parent gradients."""
     parent, D = Parent(layout, outputs), range(layout.dimension)
     for k in D:
         out.add(f"const V {', '.join(f'wI{k}{m} = w * I{k}{m}' for m in D)};")
@@ -157,7 +157,7 @@ class Pair:
 
     @property
     def tables(self) -> str:
-        """Beginning of the names of tables: others than those of the page's own file."""
+        """Prefix of the names of tables, different from that in the file of the model."""
         return f"{STEM}{self.layout.d.cell}"
 
     def components(self, side: int) -> list[Component]:
@@ -182,7 +182,7 @@ class Pair:
 
 
 def ranks(layout: Layout) -> list[tuple[Any, ...]]:
-    """Ranks of the unknowns: of two mirrored entries that with the row of lower rank is kept."""
+    """Ranks of the unknowns: of two mirrored entries that with the lower row is stored."""
     names = {c.name: c for c in layout.components}
     ranked = []
     for n, (name, node) in enumerate(layout.d.dof_nodes):
@@ -218,7 +218,7 @@ def assembled(out: Lines, pair: Pair) -> None:
 
 
 def _factor(q: Quantity, node: str) -> str:
-    """Variable that holds the shape function of a node, or its slope."""
+    """Variable with the shape function of a node, or its derivative."""
     return f"N{node}" if q.axis is None else f"D{node}{q.axis}"
 
 

@@ -62,7 +62,7 @@ class Frame:
         out.close()
 
     def factors(self, order: int, letters: Iterable[str], node: str) -> None:
-        """Shape functions N and slopes D0, D1, D2 of a node at the point q."""
+        """Shape functions N and derivatives D0, D1, D2 of a node at the point q."""
         name = self.layout.tables
         if self.layout.shape(order).long:
             for f in sorted(letters):
@@ -76,7 +76,7 @@ class Frame:
 
 
 def products(f: Frame) -> None:
-    """Shape functions N<order> and slopes D<order> at the point q where their tables are long."""
+    """Shape functions N<order> and derivatives D<order> at the point q where tables are long."""
     out, D, name = f.out, f.D, f.layout.tables
     for order in f.layout.long_orders:
         shape = f.layout.shape(order)

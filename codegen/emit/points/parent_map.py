@@ -1,4 +1,4 @@
-"""The map from the parent cell at a point: Jacobian, inverse, place, volume, and how they move."""
+"""Map from the parent cell at a point: Jacobian, position, volume, and their variations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from softehl.codegen.emit.points.loop_nest import Frame
 
 
 def write(f: Frame) -> None:
-    """Jacobian, its inverse I (parent by reference coordinate), place, volume."""
+    """Write the Jacobian, its inverse I (parent by reference coordinate), position, volume."""
     out, D = f.out, f.D
     sums = {f"J{i}{k}": (f"xs[{D} * n + {i}]", f"D{k}") for i in range(D) for k in range(D)}
     if f.needs["coordinates"] or f.ring:
@@ -45,7 +45,7 @@ def _inverse(f: Frame) -> None:
 
 
 def _moved(f: Frame) -> None:
-    """Slopes L of the variation of places, and the relative change of volume."""
+    """Write the gradient L of the variation of positions, and the relative change of volume."""
     out, D = f.out, f.D
     for i in range(D):
         for j in range(D):

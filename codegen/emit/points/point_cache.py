@@ -24,12 +24,12 @@ class Kept:
 
     @cached_property
     def frame(self) -> Frame:
-        """The frame whose inputs are kept."""
+        """Loop nest whose inputs are cached."""
         return Frame(self.layout, Task.PRODUCT, self.outputs)
 
     @property
     def names(self) -> list[str]:
-        """Variables of C that are kept at a point."""
+        """Variables of C that are cached at a point."""
         D, needs = range(self.layout.dimension), self.frame.needs
         cached = [f"I{k}{m}" for k in D for m in D] + ["w"]
         for array, letter in point_function.ARRAYS.items():

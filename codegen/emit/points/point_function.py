@@ -22,7 +22,7 @@ _NAMES = {"coordinates": "X", "dofs": "d", "data": "a", "point data": "b", "dire
 
 @dataclass(frozen=True, eq=False)
 class PointOutputs:
-    """Outputs of a task and their places: the arrays P and A of the function.
+    """Outputs of a task and their indices in the arrays P and A of the function.
 
     moduli: number in A by row and column, of those that are not zero; of symmetric ones the upper
     triangle alone. square: whether rows and columns are the same quantities.
@@ -47,7 +47,7 @@ class PointOutputs:
 
     @property
     def rates(self) -> list[Entry]:
-        """Rates of fluxes, which stand in A."""
+        """Rates of fluxes, in A."""
         return [x for x in self.entries if x.column is None and x.row.position >= RATES]
 
     @property
@@ -104,7 +104,7 @@ def text(layout: Layout, task: str, outputs: PointOutputs, plan: Schedule) -> tu
 def _statements(
     p: LanePrinter, targets: Iterable[tuple[str, Node]], statements: Iterable[Statement]
 ) -> None:
-    """Statements in their order, each output stored as soon as it is known."""
+    """Print statements in their order; each output is stored as soon as it is computed."""
     waiting: dict[Node, list[str]] = {}
     for target, n in targets:
         waiting.setdefault(n, []).append(target)

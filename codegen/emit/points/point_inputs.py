@@ -1,4 +1,4 @@
-"""Inputs of the function of a point: fields and slopes, data, history, and how they move."""
+"""Inputs of the function of a point: fields, gradients, data, history, and their variations."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class PointInputs:
         return tuple(sorted(numbers))
 
     def _with_gradient(self, quantities: Sequence[Quantity], k: int) -> list[int]:
-        """A slope with the other slopes of its component, on which its variation depends."""
+        """A gradient entry with the others of its component, on which its variation depends."""
         q = quantities[k]
         if q.axis is None:
             return [k]
@@ -83,7 +83,7 @@ class PointInputs:
     def _interpolated(
         self, source: str, quantities: dict[int, Quantity], array: str
     ) -> dict[str, str]:
-        """Values and slopes of components at the point: entry of an array -> expression.
+        """Values and gradients of components at the point: entry of an array -> expression.
 
         source: the array of the element.
         """
@@ -174,7 +174,7 @@ class PointInputs:
         return moved
 
     def _drag(self, quantities: Mapping[int, Quantity], k: int, array: str) -> str:
-        """Loss of a slope because the places move: - (slopes) L."""
+        """Change of a gradient by moving positions: - (gradient) L."""
         q = quantities[k]
         if q.axis is None:
             return ""

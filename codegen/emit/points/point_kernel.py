@@ -169,7 +169,7 @@ class Group(Frame):
         return {q: f"P[{k}]" for k, q in self.layout.form.cell_quantities.items()}
 
     def _moved_fluxes(self) -> dict[Quantity, str]:
-        """Rates of fluxes with what the moving places add."""
+        """Rates of fluxes with the contribution of moving positions."""
         numbers = {q: k for k, q in self.layout.form.cell_quantities.items()}
         fluxes: dict[Quantity, str] = {}
         for c in components(numbers):
@@ -278,7 +278,7 @@ def _store(out: Lines, layout: Layout, count: int, *, symmetric: bool) -> None:
 
 
 def _entry_table(out: Lines, layout: Layout, name: str, *, symmetric: bool) -> None:
-    """Table of the place in k_lanes of every entry, row by row.
+    """Table of the index in k_lanes of every entry, row by row.
 
     Of a symmetric tangent that of the two mirrored entries which is computed; the C compiler
     compares the ranks.
@@ -300,7 +300,7 @@ def _entry_table(out: Lines, layout: Layout, name: str, *, symmetric: bool) -> N
 
 
 def _store_by_ranks(out: Lines, layout: Layout, *, symmetric: bool) -> None:
-    """Stores of a large tangent: of two mirrored entries that of the lower rank is there."""
+    """Stores of a large tangent: of two mirrored entries the one of lower rank is computed."""
     size = len(layout.d.unknowns)
     order = {rank: n for n, rank in enumerate(sorted(ranks(layout)))}
     numbers = ", ".join(str(order[rank]) for rank in ranks(layout))

@@ -36,7 +36,7 @@ def _both(pair: Pair) -> list[tuple[Quantity, Quantity]]:
 
 @dataclass(frozen=True, eq=False)
 class _Level:
-    """The sums over the points along an axis of what stands in the array `source`."""
+    """Sums over the points along an axis of the array `source`."""
 
     out: Lines
     pair: Pair
@@ -50,7 +50,7 @@ class _Level:
         return [line for line in order_lines if line is not None]
 
     def write(self, moduli: dict[Key, str], *, alike: bool) -> None:
-        """Loops over pairs of nodes along the axis; moduli: places in the source.
+        """Write loops over pairs of nodes along the axis; moduli: indices in the source.
 
         alike: the nodes of the pair are the same along the directions that are done, so that what
         stands in the source is symmetric, and one of two mirrored pairs is enough.

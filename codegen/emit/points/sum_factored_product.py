@@ -282,11 +282,11 @@ class Factored:
 
     @property
     def _of_values(self) -> bool:
-        """True if there are fluxes that belong to values."""
+        """True if some fluxes are conjugate to values."""
         return any(q.axis is None for q in self.layout.form.unknowns)
 
     def _points(self, out: Lines, points: int) -> None:
-        """Fluxes at every point, in the places of the slopes."""
+        """Emit fluxes at each point; they overwrite the gradient buffer."""
         layout, D, count = self.layout, self.layout.dimension, len(self.cache.names)
         f = self.cache.frame
         out.open(f"for (int q = 0; q < {points}; ++q)")

@@ -86,7 +86,7 @@ def _sum(letter: str, factors: list[float]) -> str:
 def lagrange(
     nodes: list[float], at: list[float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values and slopes (points, nodes) of Lagrange's polynomials."""
+    """Values and derivatives (points, nodes) of Lagrange's polynomials."""
     values, derivatives = np.ones((len(at), len(nodes))), np.zeros((len(at), len(nodes)))
     for a, x in enumerate(nodes):
         others = [b for b in nodes if b != x]
