@@ -38,9 +38,8 @@ from softehl.codegen.emit import (
     simd_routines,
     ufcx,
 )
-from softehl.codegen.emit.basic_blocks import arranged_plan
 from softehl.codegen.emit.code_motion import Schedule, is_straight, schedule, straight_line
-from softehl.codegen.emit.instruction_scheduling import arranged
+from softehl.codegen.emit.instruction_scheduling import arranged, arranged_plan
 from softehl.codegen.emit.points import cell_constants, point_kernel, sum_factored_product
 from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_kernel import Choice, choose

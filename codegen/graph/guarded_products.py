@@ -95,7 +95,8 @@ def _product(g: Graph, facts: _Facts, x: Node, y: Node) -> Recursion[Node]:
             sides = []
             for a in x.args:
                 sides.append((yield _product(g, facts, a, y)))
-            return g.add(*sides) if x.op is Op.ADD else g.sub(*sides)
+            left, right = sides
+            return g.add(left, right) if x.op is Op.ADD else g.sub(left, right)
     active = yield facts.active(g, x)
     return g.mul(x, y) if active is None else g.branch(active, g.mul(x, y), g.zero)
 

@@ -51,21 +51,21 @@ def warn_page(message: str) -> None:
     warnings.warn_explicit(message, ModelWarning, file, int(line or 0), registry=_WARNED)
 
 
-class NeedsElement(ModelError):  # noqa: N818 (named after what it is)
+class NeedsElementError(ModelError):
     """Error of a weak form that needs quantities of the whole element."""
 
     def __init__(self, what: str) -> None:
         super().__init__(f"{what}: known in cells only, not on sides and not at a point alone")
 
 
-class Empty(ModelError):  # noqa: N818 (named after what it is)
+class NoEquationsError(ModelError):
     """A page states no equations."""
 
 
-class Elsewhere(ModelError):  # noqa: N818 (named after what it is)
+class WrongDomainError(ModelError):
     """A weak form is not for cells, or not for facets; another one of its file may be."""
 
     @classmethod
-    def no_facet(cls, what: str, cell: str) -> Elsewhere:
+    def no_facet(cls, what: str, cell: str) -> WrongDomainError:
         """Error for a quantity of facets that a weak form uses on a cell."""
         return cls(f'{what}: {cell} is a cell here; facets are on="interior" and sides of a mesh')

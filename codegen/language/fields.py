@@ -19,7 +19,7 @@ import sympy as sp
 from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.language.definition import Component
-from softehl.codegen.language.errors import Elsewhere, ModelError, NeedsElement
+from softehl.codegen.language.errors import ModelError, NeedsElementError, WrongDomainError
 from softehl.codegen.language.flatten import Entries, Matrix
 from softehl.codegen.language.model import Model
 
@@ -141,12 +141,12 @@ class Fields(Model):
     @property
     def parent(self) -> Any:
         """Coordinates of the point in the reference cell, (dimension of the cell, 1)."""
-        raise NeedsElement("m.parent")
+        raise NeedsElementError("m.parent")
 
     @property
     def jacobian(self) -> Any:
         """Derivatives of reference coordinates (rows) by those of the cell (columns)."""
-        raise NeedsElement("m.jacobian")
+        raise NeedsElementError("m.jacobian")
 
     def centroid(self, value: Any) -> Any:
         """Return a value at the centroid of the reference cell.
@@ -161,12 +161,12 @@ class Fields(Model):
         Expr, list or Matrix
             In the form of `value`.
         """
-        raise NeedsElement(f"m.centroid({value})")
+        raise NeedsElementError(f"m.centroid({value})")
 
     @property
     def size(self) -> Any:
         """Volume of the cell at a facet per area of the facet, a length [mm]."""
-        raise Elsewhere.no_facet("m.size", self.cell.name)
+        raise WrongDomainError.no_facet("m.size", self.cell.name)
 
     def jump(self, value: Any) -> Any:
         """Return the jump of a value on a facet.
@@ -188,7 +188,7 @@ class Fields(Model):
         ModelError
             The page stands on cells.
         """
-        raise Elsewhere.no_facet(f"m.jump({value})", self.cell.name)
+        raise WrongDomainError.no_facet(f"m.jump({value})", self.cell.name)
 
     def average(self, value: Any) -> Any:
         """Return the mean of a value in both cells at a facet.
@@ -208,7 +208,7 @@ class Fields(Model):
         ModelError
             The page stands on cells.
         """
-        raise Elsewhere.no_facet(f"m.average({value})", self.cell.name)
+        raise WrongDomainError.no_facet(f"m.average({value})", self.cell.name)
 
     def previous(self, field: Any) -> Any:
         """Return a field at the beginning of the step; it has gradients, too.

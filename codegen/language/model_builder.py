@@ -24,7 +24,7 @@ from softehl.codegen.graph.graph import Input, Node, Op
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language import local_unknowns
 from softehl.codegen.language.definition import Argument, Condition, Definition
-from softehl.codegen.language.errors import Empty, ModelError, page_line, warn_page
+from softehl.codegen.language.errors import ModelError, NoEquationsError, page_line, warn_page
 from softehl.codegen.language.flatten import Entries, Listed, Matrix
 from softehl.codegen.language.sympy_lowering import Symbols
 from softehl.codegen.language.sympy_tape import Integral
@@ -286,7 +286,7 @@ class Equations:
         """Sum of all potentials and weak forms, and its frozen quantities."""
         model = self._symbols.model
         if not self._potentials:
-            raise Empty(f"model {model} has neither a potential nor a weak form")
+            raise NoEquationsError(f"model {model} has neither a potential nor a weak form")
         total = self._symbols.graph.zero
         constant = dict.fromkeys(n for _, frozen in self._potentials for n in frozen)
         for value, frozen in self._potentials:

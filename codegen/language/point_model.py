@@ -17,7 +17,7 @@ from softehl.codegen.graph.differentiation import gradient
 from softehl.codegen.graph.graph import Input, Node, Op
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Component, PointForm, Quantity
-from softehl.codegen.language.errors import NeedsElement
+from softehl.codegen.language.errors import NeedsElementError
 from softehl.codegen.language.fields import AXISYMMETRIC, Fields, Traced
 from softehl.codegen.language.flatten import Entries
 
@@ -43,7 +43,7 @@ class PointModel(Fields):
             d.graph, d.potential, others, constant=d.constant, prescribed=d.prescribed
         )
         if any(varied[n] is not d.graph.zero for n in others):
-            raise NeedsElement("m.centroid of what is varied")
+            raise NeedsElementError("m.centroid of what is varied")
         d = replace(d, directions=directions)
         return PointForm(
             definition=d,
@@ -66,7 +66,7 @@ class PointModel(Fields):
                 for i in inputs
             )
             if not allowed or any(n.op is Op.CALL for n in met):
-                raise NeedsElement(f"m.centroid({value})")
+                raise NeedsElementError(f"m.centroid({value})")
             label = f"centroid_{len(self._centroid)}"
             self._centroid[len(self._quantities)] = node
             self._quantities.append(Quantity(Component(label, 0), None))

@@ -245,8 +245,8 @@ class Lowering:
         for a in e.args[1:]:
             other = yield self._lower(a)
             less = self.g.compare(Op.LT, result, other)
-            pair = (other, result) if isinstance(e, sp.Max) else (result, other)
-            result = self._decided(less, self.g.branch(less, *pair))
+            first, second = (other, result) if isinstance(e, sp.Max) else (result, other)
+            result = self._decided(less, self.g.branch(less, first, second))
         return result
 
     def _absolute(self, e: Any) -> Recursion[Node]:

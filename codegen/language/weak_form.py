@@ -10,11 +10,10 @@ from typing import Any, Literal, TypeVar, get_args, overload
 from softehl.codegen.elements.cells import element
 from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import QuadratureRule
-from softehl.codegen.language.boundary_model import BoundaryModel
+from softehl.codegen.language.boundary_model import FACES, BoundaryModel, FacetModel, shape_of
 from softehl.codegen.language.cell_model import CellModel
 from softehl.codegen.language.definition import Definition, PointForm
-from softehl.codegen.language.errors import Empty, ModelError, NeedsElement
-from softehl.codegen.language.facet_model import FACES, FacetModel, shape_of
+from softehl.codegen.language.errors import ModelError, NeedsElementError, NoEquationsError
 from softehl.codegen.language.fields import (
     AXISYMMETRIC,
     GEOMETRIES,
@@ -30,7 +29,7 @@ Write = Callable[[Fields], Any]
 Form = Literal["whole", "point"]
 
 
-class PlaceError(ModelError):
+class UnsupportedCellError(ModelError):
     """A weak form cannot be used on this cell; no line of it is wrong."""
 
     def __init__(self, message: str) -> None:
@@ -38,10 +37,10 @@ class PlaceError(ModelError):
 
 
 @dataclass(frozen=True)
-class On:
-    """Places for pages of fields: cells by name, and the geometry (None: the usual one).
+class CellOptions:
+    """Cells of weak forms by name, and their geometry (None: the default one).
 
-    materials: whether only the stress laws of a file are wanted, as bodies.
+    materials: take only the stress laws of a file, as bodies.
     """
 
     cells: tuple[str, ...] = ()
@@ -53,7 +52,7 @@ class On:
         return (*self.cells, self.geometry or "", "materials" if self.materials else "")
 
 
-NOWHERE = On()
+DEFAULT_CELL = CellOptions()
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,7 @@ class Page:
             return self._made(side, side.finish)
         try:
             point = self._at_point(name, kind, resolved)
-        except NeedsElement:
+        except NeedsElementError:
             if self.form == "point":
                 raise
             point = None
@@ -139,13 +138,13 @@ class Page:
     def _on_facet(self, name: str, kind: Element, geometry: str, facet: str) -> Definition:
         """On facets between two cells ("interior") or on those of a side ("side")."""
         if facet not in ("interior", "side"):
-            raise PlaceError(f'no facet "{facet}" of {kind.name}: "interior" or "side"')
+            raise UnsupportedCellError(f'no facet "{facet}" of {kind.name}: "interior" or "side"')
         face = element(FACES[shape_of(kind)])
         rule = rule_of(face, self.degree or 2 * order_of(kind))
         on = FacetModel(name, kind, geometry, rule, self.doc, both=facet == "interior")
         return replace(self._made(on, on.finish), cell=f"{kind.name}_{facet}")
 
-    def definitions(self, on: On) -> list[Definition]:
+    def definitions(self, on: CellOptions) -> list[Definition]:
         """Return the models of an element on all requested cells.
 
         Parameters
@@ -164,7 +163,7 @@ class Page:
             There is no such cell, or the page is wrong.
         """
         if not on.cells:
-            raise PlaceError(
+            raise UnsupportedCellError(
                 f"{self.name} is a page of fields, which stands on any cell: say which, as in "
                 'softehl.load_kernel(page, cell="hex8") or softehl generate --cell hex8'
             )
@@ -172,7 +171,7 @@ class Page:
             try:
                 element(cell.partition("_")[0])
             except ValueError as error:
-                raise PlaceError(str(error)) from None
+                raise UnsupportedCellError(str(error)) from None
         return [self.definition(cell, on.geometry) for cell in on.cells]
 
     def at_point(self, cell: str, geometry: str | None = None) -> PointForm:
@@ -211,9 +210,11 @@ class Page:
             value = applied(self.name, self.write, onto, write=f"`def {self.name}(m):`")
             return finish()
         except ModelError as error:
-            if type(error) not in (ModelError, Empty) or error.where.startswith(code.co_filename):
+            if type(error) not in (ModelError, NoEquationsError) or error.where.startswith(
+                code.co_filename
+            ):
                 raise
-            if value is not None and isinstance(error, Empty):
+            if value is not None and isinstance(error, NoEquationsError):
                 remedy = "returns a value, which is lost: say m.minimise(energy) or m.weak(...)"
                 raise ModelError(f"{error.text}; {self.name} {remedy}", where) from error
             raise ModelError(error.text, where) from error
@@ -259,7 +260,7 @@ def geometry_of(dimension: int, geometry: str | None) -> str:
     """The geometry of a mesh, checked.  Raises ModelError."""
     allowed = GEOMETRIES[dimension]
     if geometry is not None and geometry not in allowed:
-        raise PlaceError(
+        raise UnsupportedCellError(
             f"geometry = {geometry!r} of a cell in {dimension}-D; allowed is "
             + " or ".join(f'"{g}"' for g in allowed)
         )

@@ -154,7 +154,7 @@ def _shared(source: Path, text: str, command: Sequence[str], flags: Sequence[str
     It knows of the header only what is the same in all of them.
     """
     inputs = (text, c_runtime.TEXT, str(VERSION), shlex.join(command), identification(flags))
-    key = cache_store.digest("shared", *inputs)
+    key = cache_store.digest(["shared", *inputs])
 
     def complete(folder: Path) -> bool:
         data = (folder / _OBJECT).read_bytes()

@@ -21,7 +21,7 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -41,7 +41,7 @@ _DAY = 86400.0
 _PATIENCE = 300.0
 
 
-def digest(*parts: str) -> str:
+def digest(parts: Iterable[str]) -> str:
     """SHA-256 of texts, each with its length."""
     total = hashlib.sha256()
     for part in parts:
@@ -52,7 +52,7 @@ def digest(*parts: str) -> str:
 
 def content(files: Files) -> str:
     """SHA-256 of the names and texts of files."""
-    return digest(*(t for name in sorted(files) for t in (name, files[name])))
+    return digest(t for name in sorted(files) for t in (name, files[name]))
 
 
 # ------------------------------------------------------------------------------------- derived C

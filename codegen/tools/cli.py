@@ -11,7 +11,7 @@ from softehl.codegen.abi import BuildError, Target
 from softehl.codegen.elements import cell_table
 from softehl.codegen.hosts import registry
 from softehl.codegen.language.material import Law
-from softehl.codegen.language.weak_form import On
+from softehl.codegen.language.weak_form import DEFAULT_CELL, CellOptions
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import cache_store, host_files, model_loader, output_files, target_files
 from softehl.codegen.tools import user_kernels as cli_files
@@ -33,7 +33,7 @@ def generate(
     target: str = Target.SIMD,
     out: Path | None = None,
     seconds: float = SECONDS,
-    on: tuple[tuple[str, ...], str | None] = ((), None),
+    on: CellOptions = DEFAULT_CELL,
 ) -> int:
     """Generate kernels; `softehl generate`.
 
@@ -51,8 +51,8 @@ def generate(
         Folder of the files.
     seconds : float
         Time limit for the check of each kernel [s].
-    on : tuple
-        Cells and geometry of pages of fields.
+    on : CellOptions
+        Cells and geometry of weak forms.
 
     Returns
     -------
@@ -60,25 +60,33 @@ def generate(
         Exit code; 2 after an error, which is one line on stderr.
     """
     try:
-        _require_printable(*models, *([out] if out else []))
-        if target in registry.targets() and (target != Target.UFCX or _materials(models, On(*on))):
+        _require_printable([*models, *([out] if out else [])])
+        if target in registry.targets() and (target != Target.UFCX or _materials(models, on)):
             if check or trace is not None:
                 return _refused(f"--check and --trace know target simd, not {target}")
-            return host_files.generate(models, target, out, On(*on))
-        return _generate(models, check, trace, Target(target), out, seconds, On(*on))
+            return host_files.generate(models, target, out, on)
+        return _generate(
+            models,
+            check=check,
+            trace=trace,
+            target=Target(target),
+            out=out,
+            seconds=seconds,
+            on=on,
+        )
     except (ModelFileError, NoStateError, BuildError, CacheError) as error:
         return _refused(str(error))
     except OSError as error:
         return _refused(f"cannot write {error.filename}: {error.strerror or error}")
 
 
-def _materials(models: Sequence[Path], on: On) -> bool:
+def _materials(models: Sequence[Path], on: CellOptions) -> bool:
     """True for files of materials alone: target ufcx writes them otherwise than elements."""
     pages = [] if on.cells else [d for path in models for d in model_loader.pages(path, on)]
     return bool(pages) and all(isinstance(d, Law) for d in pages)
 
 
-def _require_printable(*paths: Path) -> None:
+def _require_printable(paths: Sequence[Path]) -> None:
     for path in paths:
         try:
             str(path).encode()
@@ -93,12 +101,13 @@ def _refused(message: str) -> int:
 
 def _generate(
     models: Sequence[Path],
+    *,
     check: bool,
     trace: str | None,
     target: Target,
     out: Path | None,
     seconds: float,
-    on: On,
+    on: CellOptions,
 ) -> int:
     """Regenerate `generated/`; with `check` write nothing and name what is stale (exit code 1).
 

@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from softehl.codegen.graph.graph import Node
     from softehl.codegen.language.definition import Definition
     from softehl.codegen.language.material import Law
-    from softehl.codegen.language.weak_form import On, Page
+    from softehl.codegen.language.weak_form import CellOptions, Page
 
 
-Where: TypeAlias = "tuple[tuple[str, ...], str, bool]"
+CellKey: TypeAlias = "tuple[tuple[str, ...], str, bool]"
 """Cells and geometry ("": the usual one) of pages of fields, and whether materials are wanted."""
 
 
@@ -53,7 +53,7 @@ class Library:
 
 def folder_of(
     source: Path | Definition | Page | Law,
-    where: Where = ((), "", False),
+    where: CellKey = ((), "", False),
     *,
     derivatives: bool = False,
 ) -> Path:
@@ -69,35 +69,35 @@ def folder_of(
         return library(_definitions(source, where)).folder
     sources = model_text.sources(source)
     anywhere = _file_key(sources)
-    here = _file_key(sources, *cells, geometry, "materials" if materials else "")
-    files = (None if materials else store.recall(anywhere)) or store.recall(here)
+    on_cells = _file_key(sources, [*cells, geometry, "materials" if materials else ""])
+    files = (None if materials else store.recall(anywhere)) or store.recall(on_cells)
     if files is None:
-        from softehl.codegen.language.weak_form import On
+        from softehl.codegen.language.weak_form import CellOptions
         from softehl.codegen.tools import model_loader
 
-        on = On(cells, geometry or None, materials)
+        on = CellOptions(cells, geometry or None, materials)
         definitions, inputs = model_loader.definitions_and_inputs(source, on)
         read = inputs.beyond(source, sources)
-        key = None if read is None else here if any(d.cell for d in definitions) else anywhere
+        key = None if read is None else on_cells if any(d.cell for d in definitions) else anywhere
         return library(definitions, key, read).folder
     return compiled(files)[0]
 
 
-def _for_derivatives(source: Path | Definition | Page | Law, where: Where) -> Path:
+def _for_derivatives(source: Path | Definition | Page | Law, where: CellKey) -> Path:
     """Folder of the kernels of what derivatives of results are made of."""
     cells, geometry, materials = where
     key, read = None, None
     if isinstance(source, Path):
-        options = geometry, "materials" if materials else "", "derivatives"
+        options = [*cells, geometry, "materials" if materials else "", "derivatives"]
         sources = model_text.sources(source)
-        key = _file_key(sources, *cells, *options)
+        key = _file_key(sources, options)
         files = store.recall(key)
         if files is not None:
             return compiled(files)[0]
-        from softehl.codegen.language.weak_form import On
+        from softehl.codegen.language.weak_form import CellOptions
         from softehl.codegen.tools import model_loader
 
-        on = On(cells, geometry or None, materials)
+        on = CellOptions(cells, geometry or None, materials)
         definitions, inputs = model_loader.definitions_and_inputs(source, on)
         read = inputs.beyond(source, sources)
         key = None if read is None else key
@@ -110,10 +110,10 @@ def _for_derivatives(source: Path | Definition | Page | Law, where: Where) -> Pa
     return library([d.for_derivatives() for d in free], key, read).folder
 
 
-def of_law(name: str, where: Where, *, derivatives: bool = False) -> Path:
+def of_law(name: str, where: CellKey, *, derivatives: bool = False) -> Path:
     """Folder of the kernels of a material that ships; raises ValueError for another name."""
     cells, geometry, _ = where
-    key = store.digest("law", generator(), name, *cells, geometry, str(derivatives))
+    key = store.digest(["law", generator(), name, *cells, geometry, str(derivatives)])
     files = store.recall(key)
     if files is not None:
         return compiled(files)[0]
@@ -123,9 +123,9 @@ def of_law(name: str, where: Where, *, derivatives: bool = False) -> Path:
     return library([d.for_derivatives() if derivatives else d for d in definitions], key).folder
 
 
-def _definitions(source: Definition | Page | Law, where: Where) -> list[Definition]:
+def _definitions(source: Definition | Page | Law, where: CellKey) -> list[Definition]:
     from softehl.codegen.language.material import Law
-    from softehl.codegen.language.weak_form import On, Page
+    from softehl.codegen.language.weak_form import CellOptions, Page
     from softehl.codegen.tools import model_loader
 
     cells, geometry, _ = where
@@ -133,16 +133,18 @@ def _definitions(source: Definition | Page | Law, where: Where) -> list[Definiti
         source = source.page()
     if isinstance(source, Page):
         with model_loader.errors_of(source):
-            return source.definitions(On(cells, geometry or None))
+            return source.definitions(CellOptions(cells, geometry or None))
     return [source]
 
 
-def of_files(paths: Sequence[Path], on: On | None = None) -> tuple[list[Definition], Library]:
+def of_files(
+    paths: Sequence[Path], on: CellOptions | None = None
+) -> tuple[list[Definition], Library]:
     """The models of some files, which are run, and their library."""
-    from softehl.codegen.language.weak_form import NOWHERE
+    from softehl.codegen.language.weak_form import DEFAULT_CELL
     from softehl.codegen.tools import model_loader
 
-    on = on or NOWHERE
+    on = on or DEFAULT_CELL
     sources = [model_text.sources(p) for p in paths]
     runs = [model_loader.definitions_and_inputs(p, on) for p in paths]
     found = [d for definitions, _ in runs for d in definitions]
@@ -177,7 +179,7 @@ def library(
 
 def _checked(definitions: Sequence[Definition], files: Mapping[str, str], folder: Path) -> None:
     """Check kernels once for each text of theirs; raises `quick.WrongKernelError`."""
-    passed = store.digest("checked", generator(), store.content(files))
+    passed = store.digest(["checked", generator(), store.content(files)])
     if store.recall(passed) is not None:
         return
     from softehl.codegen.verify import quick_check
@@ -190,7 +192,7 @@ def _checked(definitions: Sequence[Definition], files: Mapping[str, str], folder
 
 def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str, float]]:
     """Every generated file, and seconds by kernel (empty if they were remembered)."""
-    key = store.digest("models", generator(), *(fingerprint(d) for d in definitions))
+    key = store.digest(["models", generator(), *(fingerprint(d) for d in definitions)])
     files = store.recall(key)
     if files is not None:
         return files, {}
@@ -220,7 +222,7 @@ def compiled(files: Mapping[str, str], *, keep: bool = False) -> tuple[Path, dic
     """
     content = store.content(files)
     flags, compiler = build.tuned()
-    key = store.digest(content, str(abi.VERSION), compiler)
+    key = store.digest([content, str(abi.VERSION), compiler])
     seconds: dict[str, float] = {}
 
     def complete(folder: Path) -> bool:
@@ -241,8 +243,8 @@ def _content_of(folder: Path, files: Mapping[str, str]) -> str | None:
         return None
 
 
-def _file_key(texts: Mapping[str, str], *on: str) -> str:
-    return store.digest("file", generator(), model_text.digest(texts), *on)
+def _file_key(texts: Mapping[str, str], options: Sequence[str] = ()) -> str:
+    return store.digest(["file", generator(), model_text.digest(texts), *options])
 
 
 _CODEGEN = Path(__file__).parents[1]
@@ -252,12 +254,12 @@ _CODEGEN = Path(__file__).parents[1]
 def generator() -> str:
     """Digest of the generator: its text and the versions of SymPy and mpmath."""
     texts = [p.read_text(encoding="utf-8") for p in sorted(_CODEGEN.rglob("*.py"))]
-    return store.digest(*texts, *(version(p) for p in ("sympy", "mpmath")))
+    return store.digest([*texts, *(version(p) for p in ("sympy", "mpmath"))])
 
 
 def fingerprint(definition: Definition) -> str:
     """Digest of the content of a definition, with its graphs."""
-    return store.digest(_canonical_text(definition), _canonical_text(definition.point))
+    return store.digest([_canonical_text(definition), _canonical_text(definition.point)])
 
 
 def _canonical_text(value: Any) -> str:

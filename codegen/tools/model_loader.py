@@ -32,10 +32,10 @@ from sympy.matrices import ShapeError
 
 from softehl.codegen.language import named_symbols
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.errors import Elsewhere, ModelError
+from softehl.codegen.language.errors import ModelError, WrongDomainError
 from softehl.codegen.language.material import Law
 from softehl.codegen.language.model import Model
-from softehl.codegen.language.weak_form import NOWHERE, On, Page
+from softehl.codegen.language.weak_form import DEFAULT_CELL, CellOptions, Page
 from softehl.codegen.tools.import_record import Inputs, code_of, imports_from
 from softehl.codegen.tools.model_text import ModelFileError, read
 
@@ -56,7 +56,7 @@ _IN_SYMPY = {"fabs": "Abs", "abs": "Abs", "absolute": "Abs", "pow": "Pow", "powe
 }
 
 
-def definitions(path: Path, on: On = NOWHERE) -> list[Definition]:
+def definitions(path: Path, on: CellOptions = DEFAULT_CELL) -> list[Definition]:
     """The models of a file, which is run; raises `ModelFileError`.
 
     on: where its pages of fields stand.
@@ -64,19 +64,21 @@ def definitions(path: Path, on: On = NOWHERE) -> list[Definition]:
     return definitions_and_inputs(path, on)[0]
 
 
-def definitions_and_inputs(path: Path, on: On = NOWHERE) -> tuple[list[Definition], Inputs]:
+def definitions_and_inputs(
+    path: Path, on: CellOptions = DEFAULT_CELL
+) -> tuple[list[Definition], Inputs]:
     """As `definitions`, with what the run has read."""
     definitions, inputs = _pages_and_inputs(path, on, by_itself=False)
     return [d for d in definitions if isinstance(d, Definition)], inputs
 
 
-def pages(path: Path, on: On = NOWHERE) -> list[Definition | Law]:
+def pages(path: Path, on: CellOptions = DEFAULT_CELL) -> list[Definition | Law]:
     """The models and the materials of a file, which is run; raises `ModelFileError`."""
     return _pages_and_inputs(path, on, by_itself=True)[0]
 
 
 def _pages_and_inputs(
-    path: Path, on: On, *, by_itself: bool
+    path: Path, on: CellOptions, *, by_itself: bool
 ) -> tuple[list[Definition | Law], Inputs]:
     """Models of a file; its materials as laws, or as bodies if it has no models."""
     path = path.resolve()
@@ -103,8 +105,10 @@ def _pages_and_inputs(
     return pages, inputs
 
 
-def written_out(path: Path, seconds: float = math.inf, on: On = NOWHERE) -> dict[str, Definition]:
-    """The models of a file that is run again, with names as `language.named_symbols.Written`.
+def written_out(
+    path: Path, seconds: float = math.inf, on: CellOptions = DEFAULT_CELL
+) -> dict[str, Definition]:
+    """The models of a file that is run again, with names as `language.named_symbols.ExpandedName`.
 
     A page that loses a dependence through a name, because SymPy took it for a constant, says
     something else then. Empty where SymPy cannot do with such names what the page asks for, or not
@@ -194,21 +198,21 @@ def _makes_a_model(module: ModuleType, value: Any) -> bool:
     return annotation is Definition
 
 
-def _make_all(entries: Iterable[Any], on: On) -> list[Definition | Law]:
-    """All models that fit the cell.  Raises Elsewhere if none does."""
+def _make_all(entries: Iterable[Any], on: CellOptions) -> list[Definition | Law]:
+    """All models that fit the cell.  Raises WrongDomainError if none does."""
     made: list[Definition | Law] = []
-    refused: list[Elsewhere] = []
+    refused: list[WrongDomainError] = []
     for entry in entries:
         try:
             made += _made(entry, on)
-        except Elsewhere as error:
+        except WrongDomainError as error:
             refused.append(error)
     if refused and not made:
         raise refused[0]
     return made
 
 
-def _made(entry: Any, on: On) -> list[Definition | Law]:
+def _made(entry: Any, on: CellOptions) -> list[Definition | Law]:
     if isinstance(entry, Page):
         return [*entry.definitions(on)]
     made = entry() if callable(entry) else entry

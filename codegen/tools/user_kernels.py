@@ -22,7 +22,7 @@ from rich.table import Column, Table
 
 from softehl.codegen.abi import Target, Task
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.weak_form import NOWHERE, On
+from softehl.codegen.language.weak_form import DEFAULT_CELL, CellOptions
 from softehl.codegen.tools import build, cache_store, kernel_cache, model_loader, target_files
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.codegen.tools.trace import show as show_trace
@@ -72,7 +72,7 @@ def generate(
     check: bool = False,
     trace: str | None = None,
     seconds: float = verification.SECONDS,
-    on: On = NOWHERE,
+    on: CellOptions = DEFAULT_CELL,
 ) -> int:
     """Exit code: 0 done, 1 a tangent is off or (`check`) something is stale, 2 no such model.
 
@@ -92,7 +92,9 @@ def generate(
     return max(codes)
 
 
-def write_target(paths: Sequence[Path], target: Target, out: Path | None, on: On = NOWHERE) -> int:
+def write_target(
+    paths: Sequence[Path], target: Target, out: Path | None, on: CellOptions = DEFAULT_CELL
+) -> int:
     """The C of another target for the models of some files; exit code 0 or 2.
 
     Raises `ModelFileError`, OSError.
@@ -107,7 +109,7 @@ def default_folder(path: Path) -> Path:
     return path.parent / "generated" / path.stem
 
 
-def _generate(paths: Sequence[Path], folder: Path, seconds: float, on: On) -> int:
+def _generate(paths: Sequence[Path], folder: Path, seconds: float, on: CellOptions) -> int:
     build.tuned()  # a missing compiler is better named before the derivation than after
     definitions, made = kernel_cache.of_files(paths, on)
     changed = write(folder, made)
@@ -141,7 +143,7 @@ def _reports(
     definitions: Sequence[Definition],
     made: kernel_cache.Library,
     seconds: float,
-    on: On,
+    on: CellOptions,
 ) -> tuple[dict[str, verification.Report], list[str]]:
     """Reports of the check of each kernel, and reasons why some could not be checked."""
     written = {
@@ -257,7 +259,7 @@ def _others(folder: Path, files: Mapping[str, str]) -> tuple[list[str], list[str
     return generated, foreign
 
 
-def _check(paths: Sequence[Path], folder: Path, on: On) -> int:
+def _check(paths: Sequence[Path], folder: Path, on: CellOptions) -> int:
     definitions = [d for p in paths for d in model_loader.definitions(p, on)]
     model_loader.check_names(" ".join(p.name for p in paths), definitions)
     files, _ = kernel_cache.derive(definitions)
@@ -274,7 +276,7 @@ def _check(paths: Sequence[Path], folder: Path, on: On) -> int:
 # ------------------------------------------------------------------------------------- the trace
 
 
-def _trace(paths: Sequence[Path], name: str, on: On) -> int:
+def _trace(paths: Sequence[Path], name: str, on: CellOptions) -> int:
     definitions = [d for p in paths for d in model_loader.definitions(p, on)]
     for d in definitions:
         if d.name == name:

@@ -2,7 +2,7 @@
 
 Cells stand with their nodes turned so that the facet is their first face, and so that corner k of
 the facet in one cell is corner 1 - k (counted in a circle) in the other: what pages on facets
-(`codegen.language.facet_model`) expect.
+(`codegen.language.boundary_model`) expect.
 """
 
 from __future__ import annotations

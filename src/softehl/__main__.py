@@ -154,10 +154,18 @@ def _commands() -> "click.Group":
         Without a file the kernels that ship, in generated/, are regenerated.
         """
         with with_sympy():
+            from softehl.codegen.language.weak_form import CellOptions
             from softehl.codegen.tools.cli import generate
 
-            on = (cells, geometry)
-            return generate(models, check, trace, target, out, check_seconds, on)
+            return generate(
+                models,
+                check=check,
+                trace=trace,
+                target=target,
+                out=out,
+                seconds=check_seconds,
+                on=CellOptions(cells, geometry),
+            )
 
     @commands.command()
     def kernels() -> int:

@@ -28,7 +28,7 @@ from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.workshop import compiled, difference, element_state, off, tangent_errors
 
 HISTORY = np.array([[0.3], [0.5]])
-NOWHERE = np.zeros((1, 0))
+DEFAULT_CELL = np.zeros((1, 0))
 
 
 def coupled(n: int, *, unroll: bool, name: str = "coupled") -> Definition:
@@ -85,8 +85,8 @@ def test_systems_against_the_oracle(n: int, family: Any) -> None:
     at = element_state(kernel, (), [0.7, 0.4], **given)
     u = np.array([[0.7, 0.4]])
     named = {**given, "point_data": HISTORY[None]}
-    assert off(kernel.energy(NOWHERE, u, **named), [Oracle(d).potential(at)]) <= 1e-14
-    assert off(kernel.fields_at(NOWHERE, u, **named)[0], Oracle(d).fields(at)) <= 1e-14
+    assert off(kernel.energy(DEFAULT_CELL, u, **named), [Oracle(d).potential(at)]) <= 1e-14
+    assert off(kernel.fields_at(DEFAULT_CELL, u, **named)[0], Oracle(d).fields(at)) <= 1e-14
 
 
 def test_a_forgotten_dependence_of_the_equation_is_refused(tmp_path: Path) -> None:

@@ -21,8 +21,8 @@ from hypothesis import HealthCheck, Phase, given, settings
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, Task
 from softehl.codegen.derive import task_outputs
-from softehl.codegen.emit.basic_blocks import arranged_plan
 from softehl.codegen.emit.code_motion import If, Same, Schedule, Statement, schedule
+from softehl.codegen.emit.instruction_scheduling import arranged_plan
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.graph.graph import Graph, Input, Node, Op
 from softehl.codegen.graph.precise_arithmetic import number

@@ -109,7 +109,7 @@ def pulled_back(out: Lines, layout: Layout, outputs: PointOutputs) -> None:
     parent, D = Parent(layout, outputs), range(layout.dimension)
     for k in D:
         out.add(f"const V {', '.join(f'wI{k}{m} = w * I{k}{m}' for m in D)};")
-        out.idle(*(f"wI{k}{m}" for m in D))
+        out.idle(f"wI{k}{m}" for m in D)
     half: dict[tuple[Quantity, Quantity], str] = {}
     for (row, column), n in parent.numbers.items():
         terms = []
@@ -231,7 +231,7 @@ def _factors(out: Lines, pair: Pair, side: int, node: str, index: str) -> None:
         )
         factor = f"N{node}" if axis < 0 else f"D{node}{axis}"
         out.add(f"const double {factor} = {table};")
-        out.idle(factor)
+        out.idle([factor])
 
 
 def _columns(out: Lines, pair: Pair, columns: Columns) -> None:

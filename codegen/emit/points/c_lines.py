@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 
@@ -17,8 +17,8 @@ class Lines:
         """One line."""
         self.lines.append("    " * self.depth + text)
 
-    def idle(self, *names: str) -> None:
-        """Variables that may be left unread."""
+    def idle(self, names: Iterable[str]) -> None:
+        """Mark variables that may stay unread."""
         self.add(" ".join(f"(void){n};" for n in names))
 
     def open(self, head: str) -> None:

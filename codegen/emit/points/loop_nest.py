@@ -94,7 +94,7 @@ def products(f: Frame) -> None:
             terms = " * ".join(f"{'m' if k == by else 'l'}{k}" for k in range(D))
             out.add(f"D{order}[n][{by}] = {terms};")
         out.close()
-        out.idle(f"N{order}", f"D{order}")
+        out.idle([f"N{order}", f"D{order}"])
 
 
 def components(quantities: Iterable[Quantity]) -> list[Component]:

@@ -17,8 +17,7 @@ def write(f: Frame) -> None:
         sums |= {f"dX{i}": (f"ts[{D} * n + {i}]", "N") for i in range(D)}
     f.sums(f.layout.geometry.order, sums)
     _inverse(f)
-    named = ["det", *(f"I{k}{m}" for k in range(D) for m in range(D))]
-    out.idle(*named)
+    out.idle(["det", *(f"I{k}{m}" for k in range(D) for m in range(D))])
     if f.design:
         _moved(f)
     if f.to_unknowns or f.task == Task.ENERGY:
@@ -54,4 +53,4 @@ def _moved(f: Frame) -> None:
     ring = " + dX1 / X1" if f.ring else ""
     out.add(f"const V swell = {' + '.join(f'L{i}{i}' for i in range(D))}{ring};")
     moved = [f"L{i}{j}" for i in range(D) for j in range(D)]
-    out.idle("swell", *moved, *(f"dX{i}" for i in range(D)))
+    out.idle(["swell", *moved, *(f"dX{i}" for i in range(D))])

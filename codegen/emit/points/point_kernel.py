@@ -130,7 +130,7 @@ class Group(Frame):
             if count:
                 out.add(f"V {array}[{count}];")
                 load(out, array, source, count, width)
-                out.idle(array)
+                out.idle([array])
         out.add("M failed = softehl_mask(0);")
         if self.to_unknowns:
             out.add(f"V r[{len(d.unknowns)}];")

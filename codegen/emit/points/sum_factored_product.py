@@ -1,17 +1,17 @@
 """The tangent times a vector by sum factorisation, without a matrix: `keep` and `action`.
 
 On quadrilaterals and hexahedra of any order, for pages whose fields all have the order of the cell.
-`keep` computes once a state what a product needs at every quadrature point: the inverse Jacobian,
-the volume, and the inputs of the function of the point (gradients, data, history). `action` adds
-the product for a range of elements: values from the nodes to the points, one direction after the
-other, slopes there, fluxes, and all of it back.
+`keep` computes once a state the cache of a product at every quadrature point (`PointCache`): the
+inverse Jacobian, the volume, and the inputs of the function of the point (gradients, data,
+history). `action` adds the product for a range of elements: values from the nodes to the points,
+one direction after the other, gradients there, fluxes, and all of it back.
 
     void softehl_NAME_keep(...)      as a task; values (n, points, kept), n a multiple of 8
     void softehl_NAME_action(ptrdiff_t first, ptrdiff_t last, const double *parameters,
         const double *kept, const int *index, const double *x, double *y)
 
 first, last: elements, multiples of 8. kept: by groups of lanes, [group][point][number][lane].
-index: places in x of the first unknown of nodes with x running first, then y, then z, by groups of
+index: that in x of the first unknown of nodes with x running first, then y, then z, by groups of
 8 elements: [group][node][element]. x, y: unknowns of a node are neighbours, in the order of the
 page; behind the last one of x stand 3 numbers that are read and not used.
 """
@@ -28,14 +28,79 @@ from softehl.codegen.abi import Task
 from softehl.codegen.elements.cells import ELEMENTS
 from softehl.codegen.emit import c_source
 from softehl.codegen.emit.code_motion import Schedule
-from softehl.codegen.emit.points import cell_constants, point_function
-from softehl.codegen.emit.points.c_lines import Lines
-from softehl.codegen.emit.points.loop_nest import components
-from softehl.codegen.emit.points.point_cache import Kept
+from softehl.codegen.emit.points import cell_constants, parent_map, point_function
+from softehl.codegen.emit.points.c_lines import Lines, load
+from softehl.codegen.emit.points.loop_nest import Frame, components, products
 from softehl.codegen.emit.points.point_function import PointOutputs
+from softehl.codegen.emit.points.point_inputs import PointInputs
 from softehl.codegen.emit.points.point_layout import Layout
 from softehl.codegen.emit.points.sum_factorisation_1d import Table, lagrange, sweep
 from softehl.codegen.language.definition import Component, Quantity
+
+
+@dataclass(frozen=True, eq=False)
+class PointCache:
+    """The inverse Jacobian, the volume, and the inputs of the function of the point."""
+
+    layout: Layout
+    outputs: PointOutputs
+
+    @cached_property
+    def frame(self) -> Frame:
+        """Loop nest whose inputs are cached."""
+        return Frame(self.layout, Task.PRODUCT, self.outputs)
+
+    @property
+    def names(self) -> list[str]:
+        """Variables of C that are cached at a point."""
+        D, needs = range(self.layout.dimension), self.frame.needs
+        cached = [f"I{k}{m}" for k in D for m in D] + ["w"]
+        for array, letter in point_function.ARRAYS.items():
+            if array != "direction":
+                cached += [f"{letter}[{k}]" for k in needs[array]]
+        return cached
+
+    def text(self) -> str:
+        """The task in C: a function for one group of lanes, and one over all groups."""
+        f = self.frame
+        f.out, d = Lines(), self.layout.d
+        out, count, points = f.out, len(self.names), self.layout.points
+        sizes = {
+            "xs": ("X", d.coordinate_width, f.widths["coordinates"]),
+            "us": ("d", len(d.unknowns), f.widths["dofs"]),
+            "es": ("a", len(d.data), f.widths["data"]),
+        }
+        out.add(f"enum {{ points = {points} }};")
+        for array, (start, size, width) in sizes.items():
+            if size:
+                out.add(f"V {array}[{size}];")
+                load(out, array, start, size, width)
+                out.idle([array])
+        out.open(f"for (int q = 0; q < {points}; ++q)")
+        products(f)
+        parent_map.write(f)
+        PointInputs(f).write(direction=False)
+        out.idle(["x", "g", "e", "b"])
+        out.add(f"softehl_wide *const to = (softehl_wide *)R + {count} * q;")
+        for k, value in enumerate(self.names):
+            out.add(f"to[{k}] = {value};")
+        out.close()
+        name, body = abi.function_name(d.name, "keep"), "\n".join(out.lines)
+        moved = {"X": f.widths["coordinates"], "d": f.widths["dofs"], "a": f.widths["data"]}
+        arrays = {"X": "coordinates", "d": "dofs", "a": "data"}
+        arguments = [f"{arrays[k]} + {w} * e" if w != "0" else "0" for k, w in moved.items()]
+        return (
+            f"static void {name}_group(const double *restrict X, const double *restrict d,\n"
+            "    const double *restrict a, const double *restrict parameters, double *restrict R)\n"
+            f"{{\n    (void)X, (void)d, (void)a, (void)parameters;\n{body}\n}}\n\n"
+            f"{abi.declaration(d.name, 'keep')};\n{abi.declaration(d.name, 'keep')}\n{{\n"
+            "    (void)points, (void)modes, (void)data, (void)direction, (void)rule, (void)basis;\n"
+            "    (void)tangent;\n"
+            "    for (ptrdiff_t e = 0; e < n; e += SOFTEHL_LANES)\n"
+            f"        {name}_group({', '.join(arguments)}, "
+            f"parameters, values + {count * points} * e);\n}}\n"
+        )
+
 
 GROUP = 8
 """Elements whose node numbers stand together, whatever the lanes of the processor."""
@@ -162,9 +227,9 @@ class Factored:
         return c_source.source(self.layout.d, pieces, [*preamble, SUPPORT, *tables])
 
     @cached_property
-    def cache(self) -> Kept:
+    def cache(self) -> PointCache:
         """The variables that a product needs at a point."""
-        return Kept(self.layout, self.outputs)
+        return PointCache(self.layout, self.outputs)
 
     # the product --------------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from softehl.codegen.language.weak_form import CellOptions
 from softehl.codegen.tools import cli
 from tests.codegen.hosts.materials import j2, neo
 from tests.codegen.hosts.workshop import errors, folder, made
@@ -54,6 +55,6 @@ def test_a_file_of_materials_has_another_writer_than_elements(tmp_path: Path) ->
     assert cli.generate([path], target="ufcx", out=tmp_path / "law") == 0
     module = (tmp_path / "law" / "hooke_dolfinx.py").read_text()
     compile(module, "hooke_dolfinx.py", "exec")
-    on = (("tet4",), None)
+    on = CellOptions(("tet4",))
     assert cli.generate([path], target="ufcx", out=tmp_path / "cell", on=on) == 0
     assert [p.suffix for p in (tmp_path / "cell").iterdir()] == [".c"]
