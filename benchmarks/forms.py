@@ -69,7 +69,7 @@ def built(material: str, cell: str, form: Form | None, folder: Path) -> Built:
 
 def _compiled(source: Path, to: Path) -> float:
     """CPU seconds of the compiler."""
-    light = build.lighter(source, source.read_text())
+    light = build.extra_flags(source, source.read_text())
     flags = [f for f in build.FLAGS if f != "-shared"]
     command = ["cc", *flags, *light, '-DSOFTEHL_SIGNATURE="x"', "-c", str(source), "-o", str(to)]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -74,7 +74,7 @@ def states(name: str) -> tuple[tuple[int, int, int], list[Any]]:
 
     d = next(d for d in model_loader.definitions(PAGES) if d.name == name)
     rng, rows = np.random.default_rng(7), []
-    for s in random_states.admissible(d, 4):
+    for s in random_states.admissible_states(d, 4):
         for _ in range(DIFFERENT // 4):
             factor = rng.uniform(0.2, 1.2)
             dofs = [v * factor for v in s.dofs]

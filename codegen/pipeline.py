@@ -27,7 +27,7 @@ from dataclasses import dataclass, field, replace
 
 from softehl.codegen.abi import DESIGN, ROLLED, Target, Task, derivative_task
 from softehl.codegen.derive import point_outputs, potential_structure, task_outputs
-from softehl.codegen.derive.output_entries import Entry, placed
+from softehl.codegen.derive.output_entries import Entry, replace_values
 from softehl.codegen.derive.potential_structure import Structure
 from softehl.codegen.derive.task_outputs import Variant
 from softehl.codegen.emit import (
@@ -39,7 +39,7 @@ from softehl.codegen.emit import (
     ufcx,
 )
 from softehl.codegen.emit.code_motion import Schedule, is_straight, schedule, straight_line
-from softehl.codegen.emit.instruction_scheduling import arranged, arranged_plan
+from softehl.codegen.emit.instruction_scheduling import order_instructions, order_plan
 from softehl.codegen.emit.points import cell_constants, point_kernel, sum_factored_product
 from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_kernel import Choice, choose
@@ -223,10 +223,10 @@ def _ordered(
     entries, plan = attempt.entries, attempt.plan
     called = tuple(c_routines.called([x.node for x in entries]))
     if is_straight(plan):
-        roots, order = arranged(site.graph, [x.node for x in entries])
-        entries, plan = placed(entries, roots), straight_line(order)
+        roots, order = order_instructions(site.graph, [x.node for x in entries])
+        entries, plan = replace_values(entries, roots), straight_line(order)
     else:
-        plan = arranged_plan(site.graph, plan, [x.node for x in entries])
+        plan = order_plan(site.graph, plan, [x.node for x in entries])
     return PointOutputs(entries), plan, called
 
 
@@ -240,7 +240,7 @@ def _file(d: Definition, functions: Sequence[Function], *, single: bool) -> str:
 
 def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Function:
     """One kernel, all stages in the order of this file's first lines."""
-    forms = potential_structure.linear_forms(d) if task_outputs.differentiated(task) else None
+    forms = potential_structure.linear_forms(d) if task_outputs.is_differentiated(task) else None
     structure = None if forms is None else potential_structure.quadratic_values(d, forms)
     alternatives = [_for_target(v, task, target) for v in task_outputs.variants(d, task, structure)]
     attempts = tuple(_attempts(d, task, alternatives))
@@ -249,10 +249,10 @@ def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Func
     called = tuple(c_routines.called([x.node for x in entries]))
     self_contained = target is Target.UFCX
     if not self_contained and is_straight(plan):
-        roots, order = arranged(d.graph, [x.node for x in entries])
-        entries, plan = placed(entries, roots), straight_line(order)
+        roots, order = order_instructions(d.graph, [x.node for x in entries])
+        entries, plan = replace_values(entries, roots), straight_line(order)
     elif not self_contained:
-        plan = arranged_plan(d.graph, plan, [x.node for x in entries])
+        plan = order_plan(d.graph, plan, [x.node for x in entries])
     write = ufcx.function if self_contained else simd_kernel.function
     text, temporaries = write(d, task, entries, plan)
     name = "ufcx" if self_contained else "simd"
@@ -285,4 +285,6 @@ def _attempt(d: Definition, variant: Variant, *, unrolled: bool) -> Attempt:
     roots, trace = passes.run(d.graph, [x.node for x in variant.entries], rewrites)
     plan = schedule(roots)
     work = plan.operations_once + len(d.rule.points) * plan.operations_per_point
-    return Attempt(variant.rule, unrolled, placed(variant.entries, roots), trace, plan, work)
+    return Attempt(
+        variant.rule, unrolled, replace_values(variant.entries, roots), trace, plan, work
+    )

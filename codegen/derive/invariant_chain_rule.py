@@ -16,18 +16,18 @@ from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 
 
-def by_levels(d: Definition, s: Structure) -> Modal:
+def by_levels(d: Definition, s: Structure) -> ModalChainRule:
     """Level by level: quadratic values, linear forms, point values, modal coordinates."""
-    return Modal(d, s, (s.forms, s.squares))
+    return ModalChainRule(d, s, (s.forms, s.squares))
 
 
-def by_slopes(d: Definition, s: Structure) -> Modal:
+def by_derivatives(d: Definition, s: Structure) -> ModalChainRule:
     """Chain rule that skips the linear forms: derivatives of the top interface by point values."""
     inner = {*s.squares, *s.forms}
     upper = tuple(
         n for n in reachable([s.root, *s.constant], stop=inner.__contains__) if n in inner
     )
-    return Modal(d, s, (upper,), _named_derivatives(d.graph, s.interface, upper))
+    return ModalChainRule(d, s, (upper,), _named_derivatives(d.graph, s.interface, upper))
 
 
 def _named_derivatives(
@@ -50,7 +50,7 @@ def _named_derivatives(
 
 
 @dataclass(frozen=True)
-class Modal:
+class ModalChainRule:
     """Derivatives in modal coordinates, carried to the unknowns by their constant matrix.
 
     `upper` holds the interfaces above the point values, lowest first; `derivatives` those

@@ -25,6 +25,6 @@ class Entry:
     node: Node
 
 
-def placed(entries: Sequence[Entry], roots: Sequence[Node]) -> list[Entry]:
+def replace_values(entries: Sequence[Entry], roots: Sequence[Node]) -> list[Entry]:
     """Entries with new values in the same rows and columns."""
     return [Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]

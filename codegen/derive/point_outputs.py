@@ -5,7 +5,7 @@ from __future__ import annotations
 from softehl.codegen.abi import Task, derivative_task
 from softehl.codegen.derive import task_outputs
 from softehl.codegen.derive.output_entries import Entry, Slot
-from softehl.codegen.derive.task_outputs import moved_arguments, moved_unknowns
+from softehl.codegen.derive.task_outputs import argument_seeds, unknown_seeds
 from softehl.codegen.graph.differentiation import directional, gradient
 from softehl.codegen.graph.graph import Node
 from softehl.codegen.language.definition import Definition, PointForm
@@ -29,7 +29,7 @@ def outputs(d: Definition, task: str) -> list[Entry]:
         assert by is not None
         rates = directional(d.graph, [x.node for x in rows], {by: d.graph.one}, d.prescribed)
         return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
-    seeds = {**moved_arguments(d), **moved_unknowns(d, first_rate(d, task))}
+    seeds = {**argument_seeds(d), **unknown_seeds(d, first_rate(d, task))}
     rates = directional(d.graph, [x.node for x in rows], seeds, d.prescribed)
     return rows + [Entry(Slot(False, RATES + k), None, n) for k, n in enumerate(rates)]
 
@@ -52,7 +52,7 @@ def at_centroid(form: PointForm, task: str) -> list[Entry]:
             rows = rows + [Entry(x.row, Slot(False, k), derivatives[n]) for k, n in dofs.items()]
     elif task in (Task.PRODUCT, Task.PSEUDO_LOAD, Task.FIELDS_RATE):
         first = first_rate(d, task)
-        seeds = {} if task == Task.PRODUCT else moved_arguments(d)
+        seeds = {} if task == Task.PRODUCT else argument_seeds(d)
         seeds |= {n: g.input("direction", first + k) for k, n in dofs.items()}
         rates = directional(g, values, seeds, d.prescribed)
         rows += [Entry(Slot(False, RATES + k), None, n) for k, n in enumerate(rates)]

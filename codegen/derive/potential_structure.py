@@ -403,7 +403,7 @@ def _left(new: Mapping[Node, Node], constant: Iterable[Node]) -> tuple[Node, ...
     return tuple(new[c] for c in constant if c in new)
 
 
-def found_in(d: Definition) -> Structure | None:
+def structure_of(d: Definition) -> Structure | None:
     """Both, one after the other."""
     forms = linear_forms(d)
     return None if forms is None else quadratic_values(d, forms)

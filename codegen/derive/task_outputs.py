@@ -10,7 +10,7 @@ from softehl.codegen.abi import AT_POINTS, Task, derivative_task
 from softehl.codegen.derive import invariant_chain_rule
 from softehl.codegen.derive.multilevel_chain_rule import Linearisation
 from softehl.codegen.derive.output_entries import Entry, Slot
-from softehl.codegen.derive.potential_structure import Structure, found_in
+from softehl.codegen.derive.potential_structure import Structure, structure_of
 from softehl.codegen.graph.differentiation import directional, gradient
 from softehl.codegen.graph.graph import Input, Node
 from softehl.codegen.graph.guarded_products import Certain
@@ -47,10 +47,10 @@ class Variant:
 
 def outputs(d: Definition, task: str) -> list[Entry]:
     """Output nodes of a task, before any pass: the first of its `variants`."""
-    return next(variants(d, task, found_in(d))).entries
+    return next(variants(d, task, structure_of(d))).entries
 
 
-def differentiated(task: str) -> bool:
+def is_differentiated(task: str) -> bool:
     """False for what the page writes down itself, and for the rates of it."""
     return task not in (Task.ENERGY, *AT_POINTS)
 
@@ -60,7 +60,7 @@ def variants(d: Definition, task: str, structure: Structure | None) -> Iterator[
     if task == Task.FIELDS_RATE:
         values = [Entry(Slot(False, k), None, n) for k, (_, n) in enumerate(d.fields)]
         yield Variant("along a variation", _rates(d, task, values))
-    elif not differentiated(task):
+    elif not is_differentiated(task):
         nodes = [d.potential] if task == Task.ENERGY else [n for _, n in d.fields]
         yield Variant(
             "none, the page writes it down",
@@ -80,7 +80,9 @@ def _rules(d: Definition, task: str, structure: Structure | None) -> Iterator[Va
     if structure is not None:
         rules = {
             "level by level": invariant_chain_rule.by_levels(d, structure),
-            "by slopes of what the potential sees": invariant_chain_rule.by_slopes(d, structure),
+            "by slopes of what the potential sees": invariant_chain_rule.by_derivatives(
+                d, structure
+            ),
         }
         for rule, chain_rule in rules.items():
             yield Variant(
@@ -104,12 +106,12 @@ def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
     """The derivative of the residual `rows` along `direction` or with respect to one argument."""
     g = d.graph
     if task == Task.PRODUCT:
-        seeds = moved_unknowns(d, 0)
+        seeds = unknown_seeds(d, 0)
     elif task == Task.PSEUDO_LOAD:
-        seeds = moved_arguments(d)
+        seeds = argument_seeds(d)
     elif task == Task.FIELDS_RATE:
         first = d.coordinate_width + len(d.data) + len(d.parameters)
-        seeds = {**moved_arguments(d), **moved_unknowns(d, first)}
+        seeds = {**argument_seeds(d), **unknown_seeds(d, first)}
     else:
         by_task = {derivative_task(name): node for name, node in d.derivatives}
         seeds = {by_task[task]: g.one}
@@ -117,7 +119,7 @@ def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
     return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
 
 
-def moved_unknowns(d: Definition, first: int) -> dict[Node, Node]:
+def unknown_seeds(d: Definition, first: int) -> dict[Node, Node]:
     """Unknowns that move along `direction`, where theirs begin at the entry `first`."""
     array = {"dofs": ("direction", first), "interpolated": ("interpolated direction", 0)}
     seeds = {}
@@ -128,7 +130,7 @@ def moved_unknowns(d: Definition, first: int) -> dict[Node, Node]:
     return seeds
 
 
-def moved_arguments(d: Definition) -> dict[Node, Node]:
+def argument_seeds(d: Definition) -> dict[Node, Node]:
     """Coordinates, data and parameters that move along `direction`, in this order, and point data
     that move as the model says.
     """

@@ -78,7 +78,7 @@ def _lines(indent: str, statements: Iterable[Sequence[str]]) -> list[str]:
 ARITHMETIC = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.NEG, Op.RECIP})
 
 
-def used_once(
+def single_use_values(
     plan: Schedule, outputs: Iterable[Node], stored: Iterable[Node] = ()
 ) -> frozenset[Node]:
     """Sums and products whose only use is in the block that computes them.
@@ -198,7 +198,7 @@ class Printer:
 
     def read(self, plan: Schedule, outputs: Iterable[Node], stored: Iterable[Node] = ()) -> None:
         """Know the values that are used once, see `once.used_once`."""
-        self.once = used_once(plan, outputs, stored)
+        self.once = single_use_values(plan, outputs, stored)
 
     def text(self) -> str:
         """All lines, filled."""

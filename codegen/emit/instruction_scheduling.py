@@ -1,14 +1,14 @@
 """Instruction scheduling: few live values, and no waiting for results in progress.
 
 A C compiler keeps long straight-line code in the order in which it is written, and spills what
-does not fit its registers.  `arranged` chooses the order by list scheduling over a simulated
-register file: of everything that is ready, the piece comes next which fetches the fewest operands
-from memory, uses the most of them for the last time, and waits least for results.
+does not fit its registers.  `order_instructions` chooses the order by list scheduling over a
+simulated register file: of everything that is ready, the piece comes next which fetches the fewest
+operands from memory, uses the most of them for the last time, and waits least for results.
 
 Sums stay open while this goes on: any term may be added next, as a multiply-add when it is a
 product that nothing else uses, so that a term is consumed where it arises.
 
-In a plan with loops and branches `arranged_plan` does so for each basic block, a run of plain
+In a plan with loops and branches `order_plan` does so for each basic block, a run of plain
 values. Sums are added up in another order then, so that a value that other blocks use may have
 become another one: a `Same` says which.
 """
@@ -72,7 +72,7 @@ class _Piece:
         return tuple(dict.fromkeys(a for a in self.operands if a.op not in (Op.CONST, Op.PI)))
 
 
-def arranged(
+def order_instructions(
     g: Graph,
     roots: Sequence[Node],
     inside: Collection[Node] | None = None,
@@ -255,7 +255,7 @@ PART = 64
 """Values at least, on average, of the pieces that a run is taken apart into."""
 
 
-def arranged_plan(g: Graph, plan: Schedule, roots: Sequence[Node]) -> Schedule:
+def order_plan(g: Graph, plan: Schedule, roots: Sequence[Node]) -> Schedule:
     """The plan with every run of every block arranged."""
     work = _Runs(g, plan, roots)
     stages, computed = [], set[Node]()
@@ -373,7 +373,7 @@ class _Runs:
 
     def _arranged(self, nodes: Sequence[Node], computed: set[Node]) -> Iterator[Statement]:
         outputs = [n for n in nodes if n in self.outputs]
-        new, order = arranged(self.g, outputs, nodes, computed)
+        new, order = order_instructions(self.g, outputs, nodes, computed)
         renamed = {b: a for a, b in zip(outputs, new, strict=True) if a is not b}
         free = [Same(a, b) for b, a in renamed.items() if b.op in FREE or b in computed]
         yield from free

@@ -247,7 +247,7 @@ class _Group:
             sums.setdefault(s.args[0], []).append(s)
         for n in [n for n in sums if n.op in FREE or not n.varying]:
             self._add(sums.pop(n))
-        terms = added_at_once(loop)
+        terms = immediate_sums(loop)
         for statement in loop.body:
             if isinstance(statement, Node) and statement in terms:
                 for s, sign, term in terms[statement]:
@@ -302,7 +302,7 @@ class _Group:
             p.line(1, "}")
 
 
-def added_at_once(loop: Loop) -> dict[Node, list[tuple[Node, str, Node]]]:
+def immediate_sums(loop: Loop) -> dict[Node, list[tuple[Node, str, Node]]]:
     """Partial sums at a point that only a sum over the points uses: (sum, sign, term) instead.
 
     The terms go straight into the sum, each as a multiply-add where it is a product.

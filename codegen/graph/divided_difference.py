@@ -211,7 +211,7 @@ def _inverted(g: Graph, a: Node, negative: bool) -> Node:
     return g.recip(a) if negative else a
 
 
-def exchanged(g: Graph, values: Sequence[Node], a: Node, b: Node) -> Divided:
+def exchange_inputs(g: Graph, values: Sequence[Node], a: Node, b: Node) -> Divided:
     """Divided differences by a - b between the state and that with `a` and `b` exchanged."""
     gap, total = g.sub(a, b), g.add(a, b)
     bound = g.mul(g.const(ROUNDING**2), g.mul(total, total))

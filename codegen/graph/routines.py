@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from softehl.codegen.graph.differentiation import gradient
-from softehl.codegen.graph.divided_difference import Divided, exchanged
+from softehl.codegen.graph.divided_difference import Divided, exchange_inputs
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.guarded_products import guarded, plus
 from softehl.codegen.graph.partial_derivatives import DifferentiationError
@@ -65,7 +65,7 @@ def depends(values: Sequence[Node], sources: Iterable[Node]) -> set[Node]:
     return inside
 
 
-def sums_written_out(
+def unroll_sums(
     g: Graph, values: Sequence[Node], inside: set[Node], points: Sequence[Sequence[Fraction]]
 ) -> list[Node]:
     """`values` with the sums among `inside` as sums of one term for each of the `points`."""
@@ -78,7 +78,7 @@ def sums_written_out(
     return written_out(g, values, len(points), leaf, inside)
 
 
-def lifted(
+def lift_inputs(
     g: Graph, values: Iterable[Node], local: Sequence[Node], external: Sequence[Node]
 ) -> list[Node]:
     """Localised values in the graph around them, with `local` and `external` put in."""
@@ -140,8 +140,8 @@ class Newton(Routine):
 
     def _slope(self, g: Graph, call: Node) -> Matrix:
         s, p = items(g, call), call.args[: self.inputs - self.outputs]
-        A = [lifted(g, row, s, p) for row in self.by_local]
-        B = [lifted(g, row, s, p) for row in self.by_external]
+        A = [lift_inputs(g, row, s, p) for row in self.by_local]
+        B = [lift_inputs(g, row, s, p) for row in self.by_external]
         X = inverse(g, A)
         columns = list(zip(*B, strict=True))
         return [[_contracted(g, [g.neg(x) for x in row], c) for c in columns] for row in X]
@@ -151,7 +151,7 @@ class Newton(Routine):
         g, other_call = between.g, between.other[call]
         s, p = items(g, call), call.args[: self.inputs - self.outputs]
         other = dict(zip([*s, *p], [*items(g, other_call), *other_call.args], strict=False))
-        rows, same = between.derivatives(lifted(g, self.equations, s, p), other)
+        rows, same = between.derivatives(lift_inputs(g, self.equations, s, p), other)
         X = inverse(g, [row[: len(s)] for row in rows])
         moved = [_contracted(g, row[len(s) :], [between.rates[a] for a in p]) for row in rows]
         differences = [g.neg(_contracted(g, row, moved)) for row in X]
@@ -324,5 +324,5 @@ def derivatives_of_energy(g: Graph, r: Isotropic) -> list[Node]:
     if r.order == 1:
         return [first[a] for a in c]
     second = [gradient(g, first[a], c)[b] for k, a in enumerate(c) for b in c[k:]]
-    divided = [exchanged(g, [first[c[a]]], c[a], c[b])(first[c[a]]) for a, b in PAIRS]
+    divided = [exchange_inputs(g, [first[c[a]]], c[a], c[b])(first[c[a]]) for a, b in PAIRS]
     return [*(first[a] for a in c), *second, *divided]

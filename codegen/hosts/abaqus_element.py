@@ -24,7 +24,7 @@ def uel(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     """Every file of a user element."""
     _require(page)
     texts, kernel = c_interface.files(page, single=True)
-    references = samples(page, kernel, host.in_time(page, states))
+    references = samples(page, kernel, host.with_time_step(page, states))
     substitutions = _substitutions(page)
     texts["uel.c"] = c_interface.filled(c_interface.template("uel.c"), substitutions)
     texts["host.f90"] = host.program(page)

@@ -42,7 +42,7 @@ def dt_of(page: ElementInterface) -> float:
     return dict(page.definition.example).get("dt", 1.0)
 
 
-def in_time(page: ElementInterface, states: Sequence[State]) -> list[State]:
+def with_time_step(page: ElementInterface, states: Sequence[State]) -> list[State]:
     """States whose values of the step before are those of the state before in the list."""
     return [_stepped(page, s, states[k - 1].dofs) for k, s in enumerate(states)]
 

@@ -64,7 +64,7 @@ def header(page: ElementInterface) -> str:
     prototypes = [f"/* {_signature(t).meaning} */\n{prototype(page, t)};\n" for t in page.tasks]
     return "\n".join(
         [
-            described(page),
+            argument_comment(page),
             f"#ifndef {guard}\n#define {guard}\n\n#include <stddef.h>\n",
             '#ifdef __cplusplus\nextern "C" {\n#endif\n',
             "enum {\n" + ",\n".join(constants) + "\n};\n",
@@ -78,7 +78,7 @@ def header(page: ElementInterface) -> str:
     )
 
 
-def described(page: ElementInterface) -> str:
+def argument_comment(page: ElementInterface) -> str:
     """Comment with every argument of a model by its index."""
     d = page.definition
     rows = [f"{page.name}: {d.doc}", ""]

@@ -7,7 +7,7 @@ import json
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
 from softehl.codegen.hosts.element_interface import ElementInterface
-from softehl.codegen.hosts.material_response import VOIGT, is_small, point
+from softehl.codegen.hosts.material_response import VOIGT, is_small_strain, point
 from softehl.codegen.hosts.registry import Host, StatesOf
 from softehl.codegen.hosts.test_states import Sample, samples
 from softehl.codegen.language.material import Law
@@ -15,7 +15,7 @@ from softehl.codegen.language.material import Law
 
 def module(law: Law, states: StatesOf) -> dict[str, str]:
     """Every file of a material for forms of DOLFINx."""
-    page, small = ElementInterface(point(law)), is_small(law)
+    page, small = ElementInterface(point(law)), is_small_strain(law)
     texts, kernel = c_interface.files(page)
     references = samples(page, kernel, states(page.definition))
     substitutions = _substitutions(page, references[0], small)

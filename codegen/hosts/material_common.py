@@ -76,7 +76,7 @@ def tests(r: Response, states: StatesOf) -> tuple[dict[str, str], list[float]]:
     d = solid(r.law)
     page = ElementInterface(replace(d, tasks=(Task.TANGENT, Task.FIELDS)[: 1 + bool(d.fields)]))
     kernel = compile_model(page.definition)
-    references = samples(page, kernel, host.in_time(page, states(page.definition)))
+    references = samples(page, kernel, host.with_time_step(page, states(page.definition)))
     settings = host.settings_of(page, references[0])
     stored = len(page.state) + len(_outputs(r))
     assert page.cell is not None

@@ -78,7 +78,7 @@ class Response:
         return 7 + 6 * a - a * (a - 1) // 2 + b - a
 
 
-def is_small(law: Law) -> bool:
+def is_small_strain(law: Law) -> bool:
     """True for a law of small strains."""
     return bool(_written(law, sp.eye(3))[1].small)
 
@@ -91,7 +91,7 @@ def _written(law: Law, F: Any) -> tuple[Model, Material]:
 def response(law: Law, measure: Measure) -> Response:
     """Return the law in a measure of large strains; small-strain laws stay in theirs."""
     m = Model(law.name, nodes=1, rule=quadrature.point_rule(), doc=law.doc)
-    if is_small(law):
+    if is_small_strain(law):
         return _small(law, m)
     F0 = sp.Matrix(3, 3, [m.unknown(f"F{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)])
     steps = m.data(**{f"step{i + 1}{j + 1}": "strain from here" for i, j in VOIGT})
@@ -225,7 +225,7 @@ def packed(r: Response, states: Sequence[State]) -> Response:
 
 def point(law: Law) -> Definition:
     """The law as a page of one point: the residual is its stress, the tangent its modulus."""
-    small = is_small(law)
+    small = is_small_strain(law)
     meaning = "Unknowns: strains (shears twice), residual: stress, tangent: modulus."
     if not small:
         meaning = (

@@ -20,7 +20,7 @@ from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.elements.shapes import interpolate
 from softehl.codegen.language.definition import Component, Definition
 from softehl.codegen.language.errors import ModelError, WrongDomainError
-from softehl.codegen.language.fields import AXISYMMETRIC, Traced
+from softehl.codegen.language.fields import AXISYMMETRIC, FieldTrace
 from softehl.codegen.language.flatten import Entries
 from softehl.codegen.language.nodal_fields import NodalFields
 
@@ -246,7 +246,7 @@ class FacetModel(NodalFields):
         area = self.define("size_of_area", sp.sqrt(vector.dot(vector)))
         return area, vector / area
 
-    def _components_of(self, components: Sequence[Component]) -> list[Traced]:
+    def _components_of(self, components: Sequence[Component]) -> list[FieldTrace]:
         if components[0].order != self.order:
             raise ModelError(
                 f"{components[0].name}: on facets fields have the order of the cell, {self.order}"
@@ -266,7 +266,7 @@ class FacetModel(NodalFields):
                 gradient = [self.define(f"grad_{label}_{k}", v) for k, v in enumerate(rows)]
                 values.append((value, *gradient))
             self._others.update(zip(values[0], values[-1], strict=True))
-            traced.append(Traced(component, values[0][0], tuple(values[0][1:])))
+            traced.append(FieldTrace(component, values[0][0], tuple(values[0][1:])))
         return traced
 
     def _slopes_of(self, component: Component, column: Sequence[Any]) -> list[Any]:

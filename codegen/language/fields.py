@@ -32,7 +32,7 @@ _IN_FIELDS = "a page of fields says it with m.vector, m.scalar and m.minimise or
 
 
 @dataclass(frozen=True)
-class Traced:
+class FieldTrace:
     """Value of a component at the point, and its gradient."""
 
     component: Component
@@ -64,14 +64,14 @@ class Fields(Model):
         self.cell, self.geometry = cell, geometry
         self.dimension = cell.dimension
         self.order = order_of(cell)
-        self._traced: dict[Any, Traced] = {}
+        self._traced: dict[Any, FieldTrace] = {}
         self._densities = 0
         self._energies: dict[tuple[Any, Any], Any] = {}
 
     # what Whole, Side and Site do differently ---------------------------------------------------
 
     @abstractmethod
-    def _components_of(self, components: Sequence[Component]) -> list[Traced]:
+    def _components_of(self, components: Sequence[Component]) -> list[FieldTrace]:
         """Unknowns at nodes of one field, or data; all of one order."""
 
     @abstractmethod

@@ -59,7 +59,7 @@ class Entries:
         return self.arrange(self.values)
 
 
-class Listed(list[Any]):
+class CheckedList(list[Any]):
     """List of a model; an index that is too large is an error with the length of the list."""
 
     def __init__(self, values: Iterable[Any] = (), what: str = "the list") -> None:
@@ -75,7 +75,7 @@ class Listed(list[Any]):
             ) from None
 
 
-def applied(name: str, function: Callable[..., Any], *arguments: Any, write: str = "") -> Any:
+def call_function(name: str, function: Callable[..., Any], *arguments: Any, write: str = "") -> Any:
     """Call a function of a model; a wrong number of arguments is an error that states it.
 
     write: what to write instead; a lambda where it is left out.

@@ -14,7 +14,7 @@ import sympy as sp
 
 from softehl.codegen.elements import cells, shapes
 from softehl.codegen.language.errors import ModelError
-from softehl.codegen.language.flatten import Listed
+from softehl.codegen.language.flatten import CheckedList
 from softehl.codegen.language.model import Model
 
 
@@ -77,9 +77,10 @@ def isoparametric(m: Model, X: Any, parent: Any, label: str = "") -> Isoparametr
         [m.define(f"{label}dN_{a}{k}", v) for k, v in enumerate(row)] for a, row in enumerate(dN)
     ]
     rows = (
-        Listed(row, f"dN[{a}], the gradient of a shape function") for a, row in enumerate(gradients)
+        CheckedList(row, f"dN[{a}], the gradient of a shape function")
+        for a, row in enumerate(gradients)
     )
-    return Isoparametric(Listed(rows, "dN, one row for each node"), detJ, inverse, J)
+    return Isoparametric(CheckedList(rows, "dN, one row for each node"), detJ, inverse, J)
 
 
 def _require_parent(m: Model, size: int, parent: Any) -> None:

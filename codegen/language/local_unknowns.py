@@ -19,11 +19,11 @@ from softehl.codegen.graph.routines import (
     isotropic,
     localise,
     newton,
-    sums_written_out,
+    unroll_sums,
 )
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.errors import ModelError
-from softehl.codegen.language.flatten import Entries, applied, fraction
+from softehl.codegen.language.flatten import Entries, call_function, fraction
 from softehl.codegen.language.sympy_lowering import Symbols
 
 
@@ -57,7 +57,7 @@ def implicit(
     """
     begin, unknowns = Entries.of(start), Entries.of(start).map(lambda _: sp.Dummy(real=True))
     local = symbols.placeholders(name, unknowns)
-    residuals = Entries.of(applied(name, equations, unknowns.shaped()))
+    residuals = Entries.of(call_function(name, equations, unknowns.shaped()))
     if len(residuals.values) != len(local):
         raise ModelError(
             f"{name}: {len(residuals.values)} equations for {len(local)} unknowns; one for each"
@@ -77,7 +77,7 @@ def implicit(
     return solution
 
 
-def hold_integrals(values: Sequence[Node], unknowns: Sequence[Node]) -> bool:
+def contain_integrals(values: Sequence[Node], unknowns: Sequence[Node]) -> bool:
     """True if integrals of the unknowns are among the equations."""
     return any(n.op is Op.SUM for n in depends(values, unknowns))
 
@@ -107,7 +107,7 @@ def written_out(
             f"{name}: an integral of local unknowns may hold no point data, no interpolated "
             "field and no given derivative; use m.unknown for what the element condenses"
         )
-    return sums_written_out(graph, values, inside, rule.rows())
+    return unroll_sums(graph, values, inside, rule.rows())
 
 
 def principal(
@@ -121,7 +121,7 @@ def principal(
     entries = _symmetric_entries(symbols, name, C)
     squares = Entries([sp.Dummy(positive=True) for _ in range(3)], ("", "", ""), list)
     local = symbols.placeholders(name, squares)
-    written = applied(name, energy, *(sp.sqrt(c) for c in squares.values))
+    written = call_function(name, energy, *(sp.sqrt(c) for c in squares.values))
     value = symbols.lower(written)
     if any(isinstance(n.payload, Isotropic) for n in depends([value], local)):
         raise ModelError(f"{name}: its energy holds an energy of other stretches; add them outside")

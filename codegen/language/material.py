@@ -22,7 +22,7 @@ import sympy as sp
 from softehl.codegen.language.definition import PointForm
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.fields import AXES, Fields
-from softehl.codegen.language.flatten import Matrix, applied
+from softehl.codegen.language.flatten import Matrix, call_function
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.model_builder import NAME
 from softehl.codegen.language.weak_form import Page
@@ -242,7 +242,7 @@ class Law:
             The function defines no energy and no stress.
         """
         m = Material(self.name, model, F)
-        applied(self.name, self.write, m, write=f"`def {self.name}(m):`")
+        call_function(self.name, self.write, m, write=f"`def {self.name}(m):`")
         if m.W is None and m.P is None:
             raise ModelError(f"the material {self.name} has neither m.energy(W) nor m.stress(P)")
         if m.small is None:

@@ -17,7 +17,7 @@ import sympy as sp
 from softehl.codegen.language import local_unknowns
 from softehl.codegen.language.definition import Argument, Definition
 from softehl.codegen.language.errors import ModelError
-from softehl.codegen.language.flatten import Listed
+from softehl.codegen.language.flatten import CheckedList
 from softehl.codegen.language.model_builder import ModelBuilder
 
 __all__ = ["Argument", "Definition", "Model"]
@@ -140,7 +140,7 @@ class Model(ModelBuilder):
 
     def _internal_unknowns(self, names: Sequence[str]) -> list[sp.Symbol]:
         self._arguments.internal += names
-        return Listed([self.unknown(name) for name in names], "the internal unknowns")
+        return CheckedList([self.unknown(name) for name in names], "the internal unknowns")
 
     def interpolated(self, name: str) -> tuple[sp.Symbol, sp.Symbol]:
         """Declare a field with any number of element unknowns (`modes`).
@@ -297,7 +297,7 @@ class Model(ModelBuilder):
         """
         names = self._parent_names[: self.rule.dimension]
         point = [self._symbols.input(s, "rule", k, varying=True) for k, s in enumerate(names)]
-        return Listed(point, "the point's coordinates")
+        return CheckedList(point, "the point's coordinates")
 
     @property
     def weight(self) -> sp.Symbol:

@@ -25,7 +25,7 @@ from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language import local_unknowns
 from softehl.codegen.language.definition import Argument, Condition, Definition
 from softehl.codegen.language.errors import ModelError, NoEquationsError, page_line, warn_page
-from softehl.codegen.language.flatten import Entries, Listed, Matrix
+from softehl.codegen.language.flatten import CheckedList, Entries, Matrix
 from softehl.codegen.language.sympy_lowering import Symbols
 from softehl.codegen.language.sympy_tape import Integral
 
@@ -221,8 +221,8 @@ class Arguments:
 
 def _columns(what: str, names: Sequence[str], columns: Sequence[Sequence[Any]]) -> list[Any]:
     """Lists over the nodes, one for each name."""
-    inner = (Listed(c, f"the nodes of {n}") for n, c in zip(names, columns, strict=True))
-    return Listed(inner, f"{what} ({', '.join(names)})")
+    inner = (CheckedList(c, f"the nodes of {n}") for n, c in zip(names, columns, strict=True))
+    return CheckedList(inner, f"{what} ({', '.join(names)})")
 
 
 class Equations:
@@ -577,7 +577,7 @@ class ModelBuilder:
 
     def _condensed(self, name: str, values: list[Node], unknowns: list[Node]) -> list[Node]:
         """Equations of local unknowns; integrals of these, and with them the loop, written out."""
-        if not local_unknowns.hold_integrals(values, unknowns):
+        if not local_unknowns.contain_integrals(values, unknowns):
             return values
         if self.unroll is False:
             raise ModelError(f"{name}: its equations are integrals, which need unroll=True or None")

@@ -14,7 +14,7 @@ from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.elements.shapes import interpolate
 from softehl.codegen.language.definition import Component, Definition
-from softehl.codegen.language.fields import Fields, Traced
+from softehl.codegen.language.fields import Fields, FieldTrace
 from softehl.codegen.language.model import Model
 
 CORNERS = {e.name: linear(e).name for e in ELEMENTS.values() if e.order > 1}
@@ -101,7 +101,7 @@ class NodalFields(Fields):
         values = [product(node, None) for node in cell.lines]
         return values, [tuple(product(node, by) for by in axes) for node in cell.lines]
 
-    def _components_of(self, components: Sequence[Component]) -> list[Traced]:
+    def _components_of(self, components: Sequence[Component]) -> list[FieldTrace]:
         N = self._shape(components[0].order)
         names = [c.name for c in components]
         if not components[0].order:
@@ -117,7 +117,7 @@ class NodalFields(Fields):
             zero = [sp.Integer(0)] * self.dimension
             gradient = self._slopes_of(component, column) if component.order else zero
             named = tuple(self.define(f"grad_{name}_{k}", v) for k, v in enumerate(gradient))
-            traced.append(Traced(component, value, named))
+            traced.append(FieldTrace(component, value, named))
         return traced
 
     def _position(self) -> list[Any]:

@@ -18,7 +18,7 @@ from softehl.codegen.graph.graph import Input, Node, Op
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Component, PointForm, Quantity
 from softehl.codegen.language.errors import NeedsElementError
-from softehl.codegen.language.fields import AXISYMMETRIC, Fields, Traced
+from softehl.codegen.language.fields import AXISYMMETRIC, Fields, FieldTrace
 from softehl.codegen.language.flatten import Entries
 
 
@@ -29,7 +29,7 @@ class PointModel(Fields):
         super().__init__(name, cell, geometry, 1, point_rule(), doc)
         self._X = [x[0] for x in self.coordinates(*"XYZ"[: cell.dimension])]
         self._quantities: list[Quantity] = []
-        self._given_at_point: dict[int, Quantity] = {}
+        self._data_at_point: dict[int, Quantity] = {}
         self._centroid: dict[int, Node] = {}
 
     def form(self) -> PointForm:
@@ -49,7 +49,7 @@ class PointModel(Fields):
             definition=d,
             unknowns=unknowns,
             all=tuple(self._quantities),
-            data=dict(self._given_at_point),
+            data=dict(self._data_at_point),
             axisymmetric=self.geometry == AXISYMMETRIC,
             centroid=self._centroid,
         )
@@ -73,7 +73,7 @@ class PointModel(Fields):
             named.append(self.unknown(label))
         return entries.arrange(named)
 
-    def _components_of(self, components: Sequence[Component]) -> list[Traced]:
+    def _components_of(self, components: Sequence[Component]) -> list[FieldTrace]:
         traced = []
         for component in components:
             labels = [
@@ -84,11 +84,11 @@ class PointModel(Fields):
             if component.is_data:
                 start = len(self._arguments.lists["data"])
                 symbols = self.data(**dict.fromkeys(labels, "at the point"))
-                self._given_at_point.update(enumerate(quantities, start))
+                self._data_at_point.update(enumerate(quantities, start))
             else:
                 symbols = [self.unknown(label) for label in labels]
                 self._quantities += quantities
-            traced.append(Traced(component, symbols[0], tuple(symbols[1:])))
+            traced.append(FieldTrace(component, symbols[0], tuple(symbols[1:])))
         return traced
 
     def _position(self) -> list[Any]:

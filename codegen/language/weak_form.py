@@ -21,7 +21,7 @@ from softehl.codegen.language.fields import (
     Fields,
     order_of,
 )
-from softehl.codegen.language.flatten import applied
+from softehl.codegen.language.flatten import call_function
 from softehl.codegen.language.point_model import PointModel
 
 T = TypeVar("T")
@@ -207,7 +207,7 @@ class Page:
         where = f"{code.co_filename}:{code.co_firstlineno}"
         value = None
         try:
-            value = applied(self.name, self.write, onto, write=f"`def {self.name}(m):`")
+            value = call_function(self.name, self.write, onto, write=f"`def {self.name}(m):`")
             return finish()
         except ModelError as error:
             if type(error) not in (ModelError, NoEquationsError) or error.where.startswith(

@@ -45,7 +45,7 @@ def pair(nodes: int, others: int) -> Definition:
         reach="largest gap that counts [mm]",
         ring="1 for rings around the x axis, 0 for plane strain",
     )
-    at = _met(m, _moved(X, u), nodes)
+    at = _meeting(m, _moved(X, u), nodes)
     # where nothing decides, at the start, sides touch and stick
     augmented = m.define("trial", interpolate(at.L, lam) - rho * at.gap)
     pressure = sp.Piecewise((augmented, (at.gap - reach) * (at.gap + depth) < 0), (0, True))
@@ -130,7 +130,7 @@ class _Meeting:
         return m.define("slip", self.t[0] * came[0] + self.t[1] * came[1], interface=True)
 
 
-def _met(m: Model, x: _Sides, nodes: int) -> _Meeting:
+def _meeting(m: Model, x: _Sides, nodes: int) -> _Meeting:
     """The point of the side at a quadrature point of the part that both have in common."""
     slave, other = [c[:nodes] for c in x], [c[nodes:] for c in x]
     (s,) = m.point()

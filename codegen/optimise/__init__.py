@@ -11,7 +11,7 @@ all arguments.  No pass looks at numbers near one state.  Rounding may differ.
 | `factor` | a b + a c = a (b + c) | distributive law, on structure |
 | `inverses` | 1/x = (x^(-1/3))^3 | only where that root is always computed: x > 0 there |
 | `unrolled` | the sum over the points of a rule | its definition; points are right to 60 digits |
-| `merge_equal` | equality in a prime field (`identity`) | proven for all arguments, to 1e-30 |
+| `merge_equal_values` | equality in a prime field | proven for all arguments, to 1e-30 |
 | `invariants_first` | order of factors | commutative and associative laws |
 | `common_sums` | order of terms, constants taken out | the same laws and the distributive one |
 | `literals` | constants to 50 digits, rounded once | they depend on no argument |

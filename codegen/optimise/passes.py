@@ -26,7 +26,7 @@ from softehl.codegen.graph.traversal import (
 )
 from softehl.codegen.optimise.common_sums import common_sums
 from softehl.codegen.optimise.factoring import chain, factor, product, uses
-from softehl.codegen.optimise.value_numbering import merge_equal
+from softehl.codegen.optimise.value_numbering import merge_equal_values
 
 Roots = list[Node]
 
@@ -274,7 +274,7 @@ def straight_line(
         Pass("common factors", factor),
         Pass("inverses of roots", inverses),
         unrolled(points, data),
-        Pass("equal values", merge_equal),
+        Pass("equal values", merge_equal_values),
         Pass("invariants first", invariants_first),
         Pass("common sums", common_sums),
         Pass("common factors again", factor),

@@ -35,7 +35,7 @@ _APART = frozenset({Op.CONST, Op.PI, Op.CALL}) | BOOLEAN
 """What is never replaced: it costs nothing, or is no number."""
 
 
-def merge_equal(g: Graph, roots: list[Node]) -> list[Node]:
+def merge_equal_values(g: Graph, roots: list[Node]) -> list[Node]:
     """Roots in which equal values are computed once (the first one written wins)."""
     values = _Values()
     leaders: dict[tuple[bool, int], list[Node]] = {}

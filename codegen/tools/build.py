@@ -70,7 +70,7 @@ def signature(directory: Path) -> str:
     return digest.hexdigest()
 
 
-def intact(directory: Path) -> bool:
+def is_intact(directory: Path) -> bool:
     """True if the library is undamaged and built from the sources beside it; never loads it."""
     try:
         data = (directory / LIBRARY).read_bytes()
@@ -92,7 +92,7 @@ def compiler() -> list[str]:
         ) from None
 
 
-def lighter(source: Path, text: str) -> tuple[str, ...]:
+def extra_flags(source: Path, text: str) -> tuple[str, ...]:
     """Flags after all others for a file of C with many operations."""
     operations = sum(map(text.count, OPERATORS))
     if source.name.startswith(SHARED):
@@ -125,7 +125,7 @@ def build(
             start = perf_counter()
             text = source.read_text(encoding="utf-8")
             lanes = [] if wide is None or source.stem in wide else ["-DSOFTEHL_LANES=1"]
-            arguments = [*compiling, *lighter(source, text), *lanes, *extra]
+            arguments = [*compiling, *extra_flags(source, text), *lanes, *extra]
             if source.name.startswith(SHARED):
                 shutil.copyfile(_shared(source, text, arguments, flags), to)
             else:
@@ -168,7 +168,7 @@ def _shared(source: Path, text: str, command: Sequence[str], flags: Sequence[str
     return cache_store.folder(key, complete, make) / _OBJECT
 
 
-def tuned() -> tuple[tuple[str, ...], str]:
+def tuned_flags() -> tuple[tuple[str, ...], str]:
     """Flags for this processor if the compiler supports it, and its `identification`."""
     try:
         return FLAGS, identification(FLAGS)

@@ -73,7 +73,7 @@ def files(d: Definition | Law, target: str) -> dict[str, str]:
 
 
 def _states(d: Definition) -> list[State]:
-    return random_states.admissible(d, STATES)
+    return random_states.admissible_states(d, STATES)
 
 
 def write(folder: Path, texts: Mapping[str, str]) -> None:

@@ -152,7 +152,7 @@ def of_files(
     if len(paths) > 1:
         return found, library(found, check=False)
     read = runs[0][1].beyond(paths[0], sources[0])
-    key = None if read is None else _file_key(sources[0], *on.options())
+    key = None if read is None else _file_key(sources[0], on.options())
     return found, library(found, key, read, check=False)
 
 
@@ -221,12 +221,12 @@ def compiled(files: Mapping[str, str], *, keep: bool = False) -> tuple[Path, dic
     keep: as in `cache.folder`.
     """
     content = store.content(files)
-    flags, compiler = build.tuned()
+    flags, compiler = build.tuned_flags()
     key = store.digest([content, str(abi.VERSION), compiler])
     seconds: dict[str, float] = {}
 
     def complete(folder: Path) -> bool:
-        return build.intact(folder) and _content_of(folder, files) == content
+        return build.is_intact(folder) and _content_of(folder, files) == content
 
     def make(folder: Path) -> None:
         for name, text in files.items():

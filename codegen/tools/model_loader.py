@@ -68,17 +68,17 @@ def definitions_and_inputs(
     path: Path, on: CellOptions = DEFAULT_CELL
 ) -> tuple[list[Definition], Inputs]:
     """As `definitions`, with what the run has read."""
-    definitions, inputs = _pages_and_inputs(path, on, by_itself=False)
+    definitions, inputs = _pages_and_inputs(path, on, laws_only=False)
     return [d for d in definitions if isinstance(d, Definition)], inputs
 
 
 def pages(path: Path, on: CellOptions = DEFAULT_CELL) -> list[Definition | Law]:
     """The models and the materials of a file, which is run; raises `ModelFileError`."""
-    return _pages_and_inputs(path, on, by_itself=True)[0]
+    return _pages_and_inputs(path, on, laws_only=True)[0]
 
 
 def _pages_and_inputs(
-    path: Path, on: CellOptions, *, by_itself: bool
+    path: Path, on: CellOptions, *, laws_only: bool
 ) -> tuple[list[Definition | Law], Inputs]:
     """Models of a file; its materials as laws, or as bodies if it has no models."""
     path = path.resolve()
@@ -91,12 +91,12 @@ def _pages_and_inputs(
             raise ModelFileError(
                 f"{path.name} has no material: write `@softehl.material` above `def my_law(m):`"
             )
-        if not (by_itself or others or on.cells) and laws:
+        if not (laws_only or others or on.cells) and laws:
             raise ModelFileError(
                 f"{path.name} has materials only, which have no kernel of their own: give a --cell "
                 "for bodies of them, or a --target that takes materials"
             )
-        if not by_itself:
+        if not laws_only:
             entries = others if others and not on.materials else [law.page() for law in laws]
         pages = _make_all(entries, on)
     if not pages:

@@ -20,10 +20,10 @@ def read(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise ModelFileError(f"cannot read {shortened(path)}: {reason}") from None
+        raise ModelFileError(f"cannot read {shorten(path)}: {reason}") from None
 
 
-def shortened(path: Path) -> str:
+def shorten(path: Path) -> str:
     """A path for a message, without the middle of one that no file system takes."""
     text = str(path)
     return text if len(path.name) <= 255 else f"{text[:40]}...{text[-20:]}"

@@ -39,7 +39,7 @@ SAMPLES = 5
 
 def nanoseconds(d: Definition, tasks: Iterable[str], library: Path) -> dict[str, float]:
     """Nanoseconds of one element by task; NoStateError if no state is found."""
-    (state,) = random_states.admissible(d, 1)
+    (state,) = random_states.admissible_states(d, 1)
     along = [1.0] * len(state.dofs)
     batch = Batch(d, ctypes.CDLL(str(library)), [state] * ELEMENTS, [along] * ELEMENTS)
     return {t: 1e9 * _shortest(batch.prepared(t)[2]) / ELEMENTS for t in tasks}
@@ -110,7 +110,7 @@ def default_folder(path: Path) -> Path:
 
 
 def _generate(paths: Sequence[Path], folder: Path, seconds: float, on: CellOptions) -> int:
-    build.tuned()  # a missing compiler is better named before the derivation than after
+    build.tuned_flags()  # a missing compiler is better named before the derivation than after
     definitions, made = kernel_cache.of_files(paths, on)
     changed = write(folder, made)
     names = " ".join(p.name for p in paths)
@@ -126,7 +126,7 @@ def _generate(paths: Sequence[Path], folder: Path, seconds: float, on: CellOptio
         print(f"{d.name} gives derivatives of its own: residual and tangent were not compared")
     for d in definitions:
         for task in (t for t, e in errors.get(d.name, {}).items() if e == math.inf):
-            what = verification.culprit(d, task) or "a value"
+            what = verification.undefined_expression(d, task) or "a value"
             print(f"softehl: {d.name}: {task} is not a number: {what} has none", file=sys.stderr)
     for message in unchecked:
         print(f"softehl: {message}", file=sys.stderr)
@@ -266,7 +266,7 @@ def _check(paths: Sequence[Path], folder: Path, on: CellOptions) -> int:
     stale = [n for n, text in files.items() if _bytes(folder / n) != text.encode()]
     generated, foreign = _others(folder, files)
     stale += generated + foreign
-    if not build.intact(folder):
+    if not build.is_intact(folder):
         stale.append(build.LIBRARY)
     for name in stale:
         print(f"stale: {folder / name}", file=sys.stderr)

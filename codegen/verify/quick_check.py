@@ -17,8 +17,8 @@ from softehl.codegen.abi import BuildError, Task
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.verify.kernel_batch import Batch
-from softehl.codegen.verify.random_states import NoStateError, admissible
-from softehl.codegen.verify.verification import culprit
+from softehl.codegen.verify.random_states import NoStateError, admissible_states
+from softehl.codegen.verify.verification import undefined_expression
 
 STATES = 5
 LENGTHS = (1e-4, 1e-6)
@@ -40,7 +40,7 @@ def check(d: Definition, tasks: Sequence[str], library: Path) -> None:
     Models without such a state, and those that give derivatives of their own, are left out.
     """
     try:
-        states = [] if d.prescribed else admissible(d, STATES)
+        states = [] if d.prescribed else admissible_states(d, STATES)
     except NoStateError:
         return
     called = ctypes.CDLL(str(library))
@@ -55,7 +55,7 @@ def check(d: Definition, tasks: Sequence[str], library: Path) -> None:
             if not all(map(math.isfinite, [*values[0], *(tangents[0] if tangents else ())])):
                 raise WrongKernelError(
                     f"{d.name}: {task} is not a number where energy and fields are: "
-                    f"{culprit(d, task) or 'a value'} has none"
+                    f"{undefined_expression(d, task) or 'a value'} has none"
                 )
         for task in _contradictions(batch, tasks, direction):
             raise WrongKernelError(

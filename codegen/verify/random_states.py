@@ -55,7 +55,7 @@ class NoStateError(SoftehlError, ValueError):
     """No admissible state of a model was found; the message says what the model must give."""
 
 
-def admissible(definition: Definition, count: int) -> list[State]:
+def admissible_states(definition: Definition, count: int) -> list[State]:
     """`count` random admissible states with the same parameters, the same ones in every run.
 
     Raises `NoStateError`, with what to say in the model, if there are none.

@@ -345,7 +345,7 @@ def idle(comparison: Comparison) -> Iterator[str]:
         yield f"the residual of {comparison.d.unknowns[k]} other than zero"
 
 
-__all__ = ["BOUND", "Report", "check", "culprit", "errors"]
+__all__ = ["BOUND", "Report", "check", "errors", "undefined_expression"]
 
 BATCH = 5
 """Ordinary states, so that a group of lanes is full and some remain."""
@@ -378,7 +378,7 @@ def check(
     tasks = [
         t for t in tasks if not definition.prescribed or t in (abi.Task.ENERGY, abi.Task.FIELDS)
     ]
-    states = random_states.admissible(definition, BATCH)
+    states = random_states.admissible_states(definition, BATCH)
     comparison = Comparison(definition, written or definition, library, start + seconds)
     report = comparison.report
     if any(comparison.batch(states).silent(t) for t in tasks):
@@ -401,12 +401,12 @@ def check(
     return report
 
 
-def culprit(d: Definition, task: str) -> str | None:
+def undefined_expression(d: Definition, task: str) -> str | None:
     """Expression without a value in a task whose result is not a number, for the page's author."""
     gradients = gradient(
         d.graph, d.potential, d.directions, constant=d.constant, prescribed=d.prescribed
     )
-    states = random_states.admissible(d, BATCH)
+    states = random_states.admissible_states(d, BATCH)
     for nodes in ([gradients[u] for u in d.directions], [x.node for x in outputs(d, task)]):
         for state in states:
             fault = random_states.first_fault(nodes, state)

@@ -102,7 +102,7 @@ def test_a_wrong_pass_is_seen(
         return (*before[:place], both, *before[place + 1 :])
 
     straight = passes.straight_line
-    monkeypatch.setattr(passes, "merge_equal", lambda _, roots: roots)
+    monkeypatch.setattr(passes, "merge_equal_values", lambda _, roots: roots)
     if unroll:
         monkeypatch.setattr(passes, "straight_line", lambda *a: wrong(straight(*a)))
     else:
@@ -135,9 +135,9 @@ def test_a_conductivity_that_is_constant_near_the_ordinary_state(
 
         return rewrite(g, roots, rule)
 
-    monkeypatch.setattr(passes, "merge_equal", merged)
+    monkeypatch.setattr(passes, "merge_equal_values", merged)
     assert seen(check(bar(), TASKS[1:]))
-    monkeypatch.setattr(passes, "merge_equal", lambda _, roots: roots)
+    monkeypatch.setattr(passes, "merge_equal_values", lambda _, roots: roots)
     report = check(bar(), TASKS[1:])
     assert not seen(report)
     assert not report.tasks
@@ -159,7 +159,7 @@ def test_a_conductivity_that_is_constant_near_the_ordinary_state(
     ],
 )
 def test_a_right_page_passes(value: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(passes, "merge_equal", lambda _, roots: roots)
+    monkeypatch.setattr(passes, "merge_equal_values", lambda _, roots: roots)
     report = check(one(value))
     assert not seen(report)
     assert not report.tasks

@@ -18,7 +18,7 @@ from softehl.codegen.graph.traversal import operations
 from softehl.codegen.graph.verifier import check
 from softehl.codegen.language.sympy_lowering import Lowering
 from softehl.codegen.optimise.passes import powers
-from softehl.codegen.optimise.value_numbering import merge_equal
+from softehl.codegen.optimise.value_numbering import merge_equal_values
 from tests.codegen.random_models import UNKNOWNS, Digits, K, Meaning, OutsideError, Recipe
 from tests.codegen.random_models import expressions as random_expressions
 from tests.codegen.workshop import inputs, same_value
@@ -38,7 +38,7 @@ def lowered(*expressions: Any) -> tuple[Graph, list[Node]]:
 def merged(*expressions: Any) -> tuple[list[Node], list[Node]]:
     """Roots before and after."""
     g, roots = lowered(*expressions)
-    return roots, merge_equal(g, roots)
+    return roots, merge_equal_values(g, roots)
 
 
 def same_everywhere(before: list[Node], after: list[Node]) -> bool:
@@ -125,7 +125,7 @@ def test_a_value_that_varies_is_not_one_that_does_not() -> None:
     g = Graph()
     xi, u = g.input("rule", 0, varying=True), g.input("dofs", 0)
     roots = [g.mul(g.mul(u, u), g.call(Op.EXP, u)), g.mul(xi, g.mul(u, g.call(Op.EXP, u)))]
-    assert merge_equal(g, roots) == roots
+    assert merge_equal_values(g, roots) == roots
 
 
 def test_a_false_merge_would_be_seen() -> None:
@@ -155,7 +155,7 @@ def test_merging_keeps_random_values_as_they_were_written(expressions: list[Any]
     again = [(e + x) ** 2 - e**2 - 2 * e * x for e in expressions]
     written = [*expressions, *near, *again]
     g, roots = lowered(*written)
-    after = merge_equal(g, roots)
+    after = merge_equal_values(g, roots)
     check(after)
     for numbers in ((0.7, -0.4, 1.3, 0.9), (-1.1, 0.6, 0.35, -0.8)):
         state = dict(zip((*UNKNOWNS, K), numbers, strict=True))
@@ -178,8 +178,8 @@ def test_a_value_is_not_replaced_by_one_with_a_smaller_domain() -> None:
     hidden = g.mul(g.mul(g.mul(u, v), w), g.recip(v))
     plain = g.mul(u, w)
     later = g.mul(g.mul(g.mul(g.recip(v), w), u), v)
-    assert merge_equal(g, [hidden, plain]) == [hidden, plain]
-    assert merge_equal(g, [plain, later]) == [plain, plain]
+    assert merge_equal_values(g, [hidden, plain]) == [hidden, plain]
+    assert merge_equal_values(g, [plain, later]) == [plain, plain]
 
 
 def test_points_of_gauss_rules_multiply_exactly() -> None:
@@ -192,7 +192,7 @@ def test_points_of_gauss_rules_multiply_exactly() -> None:
     r = close_rational(1 / sp.sqrt(3))
     roots = [g.mul(g.const(Fraction(1, 3)), g.call(Op.EXP, u)), g.call(Op.EXP, u)]
     roots[1] = g.mul(g.const(r * r), roots[1])
-    after = merge_equal(g, roots)
+    after = merge_equal_values(g, roots)
     assert after[0] is after[1]
 
 

@@ -22,7 +22,7 @@ from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, Task
 from softehl.codegen.derive import task_outputs
 from softehl.codegen.emit.code_motion import If, Same, Schedule, Statement, schedule
-from softehl.codegen.emit.instruction_scheduling import arranged_plan
+from softehl.codegen.emit.instruction_scheduling import order_plan
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.graph.graph import Graph, Input, Node, Op
 from softehl.codegen.graph.precise_arithmetic import number
@@ -318,8 +318,8 @@ def test_a_schedule_stores_before_it_loads() -> None:
             roots, _ = passes.run(d.graph, roots, passes.STANDARD)
             plan, exact = schedule(roots), values(d, roots, state)
             assert same(executed(plan, roots, state), exact), name
-            arranged = arranged_plan(d.graph, plan, roots)
-            assert same(executed(arranged, roots, state), exact), f"{name}, arranged"
+            ordered = order_plan(d.graph, plan, roots)
+            assert same(executed(ordered, roots, state), exact), f"{name}, arranged"
 
 
 def test_a_wrong_order_is_refused() -> None:

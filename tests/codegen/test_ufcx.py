@@ -177,7 +177,7 @@ def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -
     """Cells of two mixed fields with data and history, against the batched kernel."""
     place = tmp_path_factory.mktemp("random")
     kernels, batch = cell_kernels(d, place), compiled(d, place)
-    (s,) = random_states.admissible(d, 1)
+    (s,) = random_states.admissible_states(d, 1)
     at, dim = emit_ufcx.vertex_positions(d), len(d.coordinates)
     w, vertices = np.empty(len(at)), np.zeros((d.nodes, 3))
     w[at] = s.dofs

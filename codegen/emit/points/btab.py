@@ -104,7 +104,7 @@ class Parent:
         return [q for q in self.quantities if q.component == c]
 
 
-def pulled_back(out: Lines, layout: Layout, outputs: PointOutputs) -> None:
+def pull_back(out: Lines, layout: Layout, outputs: PointOutputs) -> None:
     """Write S of the point q: w T A T^T, where T turns gradients into parent gradients."""
     parent, D = Parent(layout, outputs), range(layout.dimension)
     for k in D:
@@ -196,7 +196,7 @@ def ranks(layout: Layout) -> list[tuple[Any, ...]]:
 Columns = dict[tuple[Quantity, Component], int]
 
 
-def assembled(out: Lines, pair: Pair) -> None:
+def assemble(out: Lines, pair: Pair) -> None:
     """Node b outermost, two nodes a at a time, the sums over the points innermost."""
     layout = pair.layout
     nodes = [layout.shape(order).nodes for order in pair.order]

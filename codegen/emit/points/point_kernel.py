@@ -30,7 +30,7 @@ from softehl.codegen.emit.points import (
     point_function,
     sum_factored_btab,
 )
-from softehl.codegen.emit.points.btab import STEM, Pair, Parent, pulled_back, ranks
+from softehl.codegen.emit.points.btab import STEM, Pair, Parent, pull_back, ranks
 from softehl.codegen.emit.points.c_lines import Lines, load, store
 from softehl.codegen.emit.points.loop_nest import Frame, components, products, to_nodes
 from softehl.codegen.emit.points.point_function import PointOutputs
@@ -159,7 +159,7 @@ class Group(Frame):
             moved = self.task == Task.PSEUDO_LOAD
             to_nodes(self, self._moved_fluxes() if moved else self._plain_fluxes(), "r", "w * ")
         if self.task == Task.TANGENT:
-            pulled_back(out, self.layout, outputs)
+            pull_back(out, self.layout, outputs)
             for k, fluxes in enumerate(self.parent.of_centroid):
                 out.open("")
                 to_nodes(self, fluxes, f"T[{k}]", "w * ")
@@ -249,7 +249,7 @@ def _body(layout: Layout, outputs: PointOutputs) -> str:
     for pair in pairs:
         if pair.entries:
             lines = [layout.shape(order).line for order in pair.order]
-            (sum_factored_btab if all(lines) else btab).assembled(out, pair)
+            (sum_factored_btab if all(lines) else btab).assemble(out, pair)
     size, values = len(layout.d.unknowns), len(parent.of_centroid)
     if values:
         out.open(f"for (int i = 0; i < {size}; ++i)")

@@ -18,7 +18,7 @@ Key = tuple[Component, int | None, Component, int | None]
 """A modulus: component and direction (None: value) of the row and of the column."""
 
 
-def assembled(out: Lines, pair: Pair) -> None:
+def assemble(out: Lines, pair: Pair) -> None:
     """The loops over pairs of nodes along the directions, the last one outermost."""
     values: dict[Key, str] = {}
     for row, column in _both(pair):

@@ -52,7 +52,7 @@ def errors(printed: str) -> list[float]:
 
 def off_python(d: Definition, place: Path) -> float:
     """Largest difference of residual and tangent in libNAME.so from those of the Python kernel."""
-    states = random_states.admissible(d, 3)
+    states = random_states.admissible_states(d, 3)
     X, u = (np.array([getattr(s, k) for s in states]) for k in ("coordinates", "dofs"))
     constants, points = (np.array([getattr(s, k) for s in states]) for k in ("data", "point_data"))
     p, n, size = np.array(states[0].parameters), len(u), len(d.unknowns)
