@@ -300,7 +300,7 @@ def test_a_damaged_entry_is_built_anew(wheel: Path, tmp_path: Path) -> None:
         damage(path.parent, kind, tmp_path / "other")
         assert used(using(wheel)) == ("tuned", path, ""), kind
         assert len(path.read_bytes()) == len(whole), kind
-        assert build.intact(path.parent), kind
+        assert build.is_intact(path.parent), kind
         assert stat.S_IMODE(path.parent.stat().st_mode) & 0o022 == 0, kind
 
 
@@ -353,6 +353,6 @@ def test_a_users_build_is_not_stopped_by_warnings(wheel: Path, tmp_path: Path) -
     for source in build.GENERATED.glob("*.[ch]"):
         shutil.copy(source, tmp_path)
     build.build(tmp_path, flags=build.PLAIN, extra=("-O0",))
-    assert build.intact(tmp_path)
+    assert build.is_intact(tmp_path)
     mode = stat.S_IMODE((tmp_path / build.LIBRARY).stat().st_mode)
     assert mode & 0o444 == 0o444
