@@ -1,1 +1,1 @@
-"""The compiler: from a page of SymPy to lean C with an exact tangent."""
+"""The compiler: from a model of SymPy to lean C with an exact tangent."""

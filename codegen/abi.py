@@ -8,7 +8,7 @@ Every kernel of a family `NAME` is a function `softehl_NAME_TASK` of one type,
            const double *rule, const double *basis, double *values, double *tangent);
 
 that handles `n` elements one after another.  Arrays are contiguous, row-major, of doubles, and do
-not overlap.  Units are those of the model's page (mm, MPa, N, s in the shipped ones).
+not overlap.  Units are those of the model's model (mm, MPa, N, s in the shipped ones).
 
 | argument      | shape                | meaning                                                  |
 |---------------|----------------------|----------------------------------------------------------|
@@ -59,10 +59,10 @@ Targets
 `simd` (the default): the functions above, several elements at once, one a lane of a vector: eight
 with AVX-512, else four.  If a batch is no multiple of the lanes, its last elements are computed and
 written twice.  A kernel of an interpolated field keeps 8 (ndof + ndof^2) bytes a lane on the stack;
-so does the tangent of a page of fields that is compiled as loops around a point, besides the moduli
+so does the tangent of a weak form that is compiled as loops around a point, besides the moduli
 of its points.  Such a family has its rule written into it, and calls
 `void softehl_pairs_CELL_DIGEST`, which makes tangents of moduli and stands in a file of its own,
-the same for all pages with the same fields.  The lanes are the vector extensions of gcc >= 12 and
+the same for all models with the same fields.  The lanes are the vector extensions of gcc >= 12 and
 clang; another compiler, or `-DSOFTEHL_LANES=1`, gets groups of one element from the same source.
 `scalar`: the same text with one lane: one element after another, plain C11.
 `ufcx`: one cell at a time for DOLFINx custom kernels.  The tasks `energy`, `residual`, `tangent`,
@@ -121,7 +121,7 @@ ROLLED = (*AT_POINTS, Task.PSEUDO_LOAD)
 
 
 class TargetError(SoftehlError, ValueError):
-    """The page has something that the target cannot hold; the message names it."""
+    """The model has something that the target cannot hold; the message names it."""
 
 
 class BuildError(SoftehlError, RuntimeError):

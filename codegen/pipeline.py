@@ -1,6 +1,6 @@
-"""The whole compiler on one screen: every stage from a model page to C, in order.
+"""The whole compiler on one screen: every stage from a model to C, in order.
 
-    page        SymPy expressions become a graph of exact numbers (`language`)
+    model       SymPy expressions become a graph of exact numbers (`language`)
     tasks       what the kernel family computes: energy, residual, tangent, ...
     interfaces  the few linear forms through which the potential sees its unknowns
     invariants  the fewest quadratic values of these forms of which the energy is a function
@@ -14,7 +14,7 @@
                 at a time is the same text with one lane
     routines    local iterations and functions of stretches as C functions of their own
 
-A page of fields on a large cell goes another way (`form`): all of this for the function of a point
+A weak form on a large cell goes another way (`form`): all of this for the function of a point
 alone, and loops over points and nodes around it (`emit.points`).
 
 `softehl generate --trace KERNEL` shows what each of them did.
@@ -130,7 +130,7 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
 
 
 def _with_action(made: KernelSource) -> KernelSource:
-    """With a file for products by sum factorisation, where the page offers products on such a cell.
+    """Add a file for products by sum factorisation where the model offers products on such cells.
 
     See `emit.points.sum_factored_product`.
     """
@@ -150,7 +150,7 @@ def _with_action(made: KernelSource) -> KernelSource:
 
 
 def form(d: Definition) -> Choice:
-    """Form of the kernels of a page: whole elements, or loops around functions of a point."""
+    """Form of the kernels of a model: whole elements, or loops around functions of a point."""
     if d.point is None:
         return Choice(False, "no page of fields")
     site = d.point.definition
@@ -170,7 +170,7 @@ def _moduli(site: Definition, task: str) -> Attempt:
 
 
 def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
-    """All kernels of a page of fields, as loops around functions of the point."""
+    """All kernels of a weak form, as loops around functions of the point."""
     assert d.point is not None
     layout = Layout(d, d.point)
     functions = {t: _at_point(layout, t) for t in tasks}
@@ -189,7 +189,7 @@ def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
 
 
 def _at_point(layout: Layout, task: str) -> Function:
-    """One kernel of a page of fields: the function of a point and the loops of the cell."""
+    """One kernel of a weak form: the function of a point and the loops of the cell."""
     attempt = _moduli(layout.site, task)
     outputs, plan, called = _ordered(layout, task, attempt)
     made = point_kernel.kernel(
@@ -262,7 +262,7 @@ def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Func
 def _attempts(d: Definition, task: str, alternatives: Sequence[Variant]) -> Iterator[Attempt]:
     """Every way with a loop over the points; of short ones also with the loop written out.
 
-    A page may have decided (`Definition.unroll`), or the task does.  A loop over shape functions
+    A model may have decided (`Definition.unroll`), or the task does.  A loop over shape functions
     stands inside the one over the points, which stays.
     """
     fixed = False if task in ROLLED or d.interpolated else d.unroll

@@ -345,7 +345,7 @@ class Structure:
 
     `interface` holds the modal coordinates and the point values, `forms` the linear forms of
     these (displacement gradients), `squares` quadratic values of the forms (strain measures);
-    `invariants` is True where the squares are fewer than those of the page.
+    `invariants` is True where the squares are fewer than those of the model.
     """
 
     root: Node
@@ -377,8 +377,8 @@ def linear_forms(d: Definition) -> Structure | None:
 def quadratic_values(d: Definition, s: Structure) -> Structure:
     """The structure through named quadratic values of the forms: invariants where some suffice.
 
-    In three dimensions no invariants are looked for in pages of fields, where this takes ten times
-    as long as all the rest and saves one operation in fourteen, and in pages with history, whose
+    In three dimensions no invariants are looked for in weak forms, where this takes ten times
+    as long as all the rest and saves one operation in fourteen, and in models with history, whose
     local equations hold so many polynomials that the search takes minutes.
     """
     g = d.graph

@@ -51,7 +51,7 @@ def outputs(d: Definition, task: str) -> list[Entry]:
 
 
 def is_differentiated(task: str) -> bool:
-    """False for what the page writes down itself, and for the rates of it."""
+    """False for what the model writes down itself, and for the rates of it."""
     return task not in (Task.ENERGY, *AT_POINTS)
 
 

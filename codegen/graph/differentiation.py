@@ -20,7 +20,7 @@ from softehl.codegen.graph.partial_derivatives import Partials, partials
 from softehl.codegen.graph.traversal import reachable
 
 PrescribedDerivatives = Mapping[Node, Mapping[Node, Node]]
-"""Derivatives that a page gives: of a node with respect to others."""
+"""Derivatives that a model gives: of a node with respect to others."""
 
 
 @dataclass

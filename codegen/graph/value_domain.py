@@ -23,7 +23,7 @@ _PLAIN = (Op.NAME, Op.NEG, Op.ADD, Op.SUB)
 WHOLE = frozenset(map(Fraction, range(1, 10)))
 """Exponents of powers that are products: they have a value everywhere."""
 _GIVEN = {"parameters", "data", "point data", "rule", "coordinates"}
-"""Arguments that a page may divide by: who gives them knows that they are not zero."""
+"""Arguments that a model may divide by: who gives them knows that they are not zero."""
 _DEEP = 50
 """Levels that are looked at, so that Python's stack holds them."""
 

@@ -22,13 +22,13 @@ INCREMENTS = 4
 """Increments of the patch."""
 
 
-def program(page: ElementInterface) -> str:
+def program(interface: ElementInterface) -> str:
     """The host itself, in Fortran."""
     substitutions = {
-        "name": page.name,
+        "name": interface.name,
         "limit": _fortran(LIMIT),
         "difference": _fortran(DIFFERENCE),
-        "differences": ".false." if page.definition.prescribed else ".true.",
+        "differences": ".false." if interface.definition.prescribed else ".true.",
     }
     return c_interface.filled(c_interface.template("uel_host.f90"), substitutions)
 
@@ -37,18 +37,18 @@ def _fortran(value: float) -> str:
     return f"{value:g}".replace("e", "d")
 
 
-def dt_of(page: ElementInterface) -> float:
+def dt_of(interface: ElementInterface) -> float:
     """Length of an increment."""
-    return dict(page.definition.example).get("dt", 1.0)
+    return dict(interface.definition.example).get("dt", 1.0)
 
 
-def with_time_step(page: ElementInterface, states: Sequence[State]) -> list[State]:
+def with_time_step(interface: ElementInterface, states: Sequence[State]) -> list[State]:
     """States whose values of the step before are those of the state before in the list."""
-    return [_stepped(page, s, states[k - 1].dofs) for k, s in enumerate(states)]
+    return [_stepped(interface, s, states[k - 1].dofs) for k, s in enumerate(states)]
 
 
-def _stepped(page: ElementInterface, state: State, previous: Sequence[float]) -> State:
-    dt = dt_of(page)
+def _stepped(interface: ElementInterface, state: State, previous: Sequence[float]) -> State:
+    dt = dt_of(interface)
 
     def value(source: Source, default: float) -> float:
         match source:
@@ -60,80 +60,90 @@ def _stepped(page: ElementInterface, state: State, previous: Sequence[float]) ->
 
     return replace(
         state,
-        parameters=[value(s, v) for s, v in zip(page.parameters, state.parameters, strict=True)],
-        data=[value(s, v) for s, v in zip(page.data, state.data, strict=True)],
+        parameters=[
+            value(s, v) for s, v in zip(interface.parameters, state.parameters, strict=True)
+        ],
+        data=[value(s, v) for s, v in zip(interface.data, state.data, strict=True)],
     )
 
 
-def settings_of(page: ElementInterface, s: Sample) -> list[float]:
+def settings_of(interface: ElementInterface, s: Sample) -> list[float]:
     """Values of the properties: those of a state."""
-    values = [0.0] * len(page.inputs)
-    pairs = [*zip(page.parameters, s.state.parameters, strict=True)]
-    pairs += [*zip(page.data, s.state.data, strict=True)]
+    values = [0.0] * len(interface.inputs)
+    pairs = [*zip(interface.parameters, s.state.parameters, strict=True)]
+    pairs += [*zip(interface.data, s.state.data, strict=True)]
     for source, v in pairs:
         if isinstance(source, UserInput):
             values[source.index] = v
     return values
 
 
-def _renewed(page: ElementInterface, s: Sample, stored: int | None) -> list[float]:
+def _renewed(interface: ElementInterface, s: Sample, stored: int | None) -> list[float]:
     """State of all points after a step, then the fields."""
-    width = len(page.definition.fields)
+    width = len(interface.definition.fields)
     rows = [list(row) for row in s.state.point_data]
     for q, row in enumerate(rows):
-        for k, field in enumerate(page.renewed):
+        for k, field in enumerate(interface.renewed):
             if field is not None:
                 row[k] = s.fields[width * q + field]
     return [*(v for row in rows for v in row), *s.fields][:stored]
 
 
 def sample_file(
-    page: ElementInterface, references: Sequence[Sample], stored: int | None = None
+    interface: ElementInterface, references: Sequence[Sample], stored: int | None = None
 ) -> str:
     """samples.txt: what the host hands over, and what the element must give back.
 
     stored: numbers that the element stores; without it, state and fields.
     """
-    order, size = page.by_node(), len(page.definition.unknowns)
-    after = _renewed(page, references[0], stored)
-    head = [len(references), size, page.definition.nodes, page.dimension]
-    lines = [" ".join(map(str, (*head, len(page.inputs), len(after), len(references[0].fields))))]
+    order, size = interface.by_node(), len(interface.definition.unknowns)
+    after = _renewed(interface, references[0], stored)
+    head = [len(references), size, interface.definition.nodes, interface.dimension]
+    lines = [
+        " ".join(map(str, (*head, len(interface.inputs), len(after), len(references[0].fields))))
+    ]
     for k, s in enumerate(references):
         u, previous = s.state.dofs, references[k - 1].state.dofs
         old = [v for row in s.state.point_data for v in row]
         matrix = [s.tangent[i * size + j] for j in order for i in order]
         groups = (
-            [dt_of(page)],
+            [dt_of(interface)],
             s.state.coordinates,
             [u[i] for i in order],
             [u[i] - previous[i] for i in order],
-            settings_of(page, s),
+            settings_of(interface, s),
             [*old, *[0.0] * len(s.fields)][:stored],
             [-s.residual[i] for i in order],
             matrix,
-            _renewed(page, s, stored),
+            _renewed(interface, s, stored),
         )
         lines += [" ".join(repr(float(v)) for v in group) for group in groups]
     return "\n".join(lines) + "\n"
 
 
-def patch_file(page: ElementInterface, mesh: Patch, settings: Sequence[float]) -> str:
+def patch_file(interface: ElementInterface, mesh: Patch, settings: Sequence[float]) -> str:
     """Text of patch.txt: mesh, equations of each cell, prescribed values."""
-    number, fixed = patch_mesh.numbers(page, mesh), patch_mesh.prescribed(page, mesh)
-    width = page.variables
-    initial = patch_mesh.starts(page)
-    state = [dict(page.definition.example).get(a.name, 0.0) for a in page.state]
-    start = ([*state * page.points] + [0.0] * width)[:width]
-    of_place = {dof: k for k, f in enumerate(page.nodal) for dof in f.dofs}
-    nodes = [page.definition.dof_nodes[i][1] for i in page.by_node()]
-    head = [len(mesh.points), page.dimension, len(mesh.cells), page.definition.nodes]
-    head += [len(page.definition.unknowns), len(number), len(page.inputs), width, len(fixed)]
-    lines = [" ".join(map(str, [*head, INCREMENTS, INCREMENTS * dt_of(page)]))]
+    number, fixed = patch_mesh.numbers(interface, mesh), patch_mesh.prescribed(interface, mesh)
+    width = interface.variables
+    initial = patch_mesh.starts(interface)
+    state = [dict(interface.definition.example).get(a.name, 0.0) for a in interface.state]
+    start = ([*state * interface.points] + [0.0] * width)[:width]
+    of_place = {dof: k for k, f in enumerate(interface.nodal) for dof in f.dofs}
+    nodes = [interface.definition.dof_nodes[i][1] for i in interface.by_node()]
+    head = [len(mesh.points), interface.dimension, len(mesh.cells), interface.definition.nodes]
+    head += [
+        len(interface.definition.unknowns),
+        len(number),
+        len(interface.inputs),
+        width,
+        len(fixed),
+    ]
+    lines = [" ".join(map(str, [*head, INCREMENTS, INCREMENTS * dt_of(interface)]))]
     lines += [" ".join(map(repr, p)) for p in mesh.points]
     for cell in mesh.cells:
         dofs = [
             number[cell[node or 0], of_place[i]] + 1
-            for i, node in zip(page.by_node(), nodes, strict=True)
+            for i, node in zip(interface.by_node(), nodes, strict=True)
         ]
         lines.append(" ".join(str(v) for v in [*(n + 1 for n in cell), *dofs]))
     lines.append(" ".join(repr(float(v)) for v in settings))

@@ -17,7 +17,7 @@ def umat(law: Law, states: StatesOf) -> dict[str, str]:
     """Every file of a user material."""
     r = response(law, Measure.CAUCHY)
     r = checked(r, [replace(s, data=()) for s in states(r.written)])
-    texts, _ = c_interface.files(r.page, single=True)
+    texts, _ = c_interface.files(r.interface, single=True)
     more, settings = shared.tests(r, states)
     substitutions = {
         **shared.substitutions(r, "*noel"),

@@ -1,6 +1,6 @@
-"""The C of a page that every host calls: NAME.h with sizes and functions, NAME.c with kernels.
+"""The C of a model that every host calls: NAME.h with sizes and functions, NAME.c with kernels.
 
-The functions take plain arrays of n elements, in the order of the page, and know their quadrature.
+The functions take plain arrays of n elements, in the order of the model, and know their quadrature.
 """
 
 from __future__ import annotations
@@ -20,18 +20,20 @@ from softehl.codegen.pipeline import KernelSource
 ARRAYS = "ptrdiff_t n, const double *X, const double *u, const double *data,\n    const double *p"
 
 
-def files(page: ElementInterface, *, single: bool = False) -> tuple[dict[str, str], KernelSource]:
-    """Header, functions and kernels of a page, and the kernels' record.
+def files(
+    interface: ElementInterface, *, single: bool = False
+) -> tuple[dict[str, str], KernelSource]:
+    """Header, functions and kernels of a model, and the kernels' record.
 
     single: for a host that asks for one element at a time, so that lanes would be empty.
     """
-    kernel = pipeline.compile_model(page.definition)
+    kernel = pipeline.compile_model(interface.definition)
     lanes = [c_source.ONE_LANE] if single else []
-    names = [abi.function_name(page.name, t) for t in kernel.functions]
+    names = [abi.function_name(interface.name, t) for t in kernel.functions]
     return {
-        f"{page.name}.h": header(page),
-        f"{page.name}.c": "\n".join(
-            [*lanes, *map(_private, kernel.shared.values()), kernel.text, functions(page)]
+        f"{interface.name}.h": header(interface),
+        f"{interface.name}.c": "\n".join(
+            [*lanes, *map(_private, kernel.shared.values()), kernel.text, functions(interface)]
         ),
         c_source.HEADER: c_source.header(names, signed=False),
     }, kernel
@@ -42,29 +44,31 @@ def _private(shared: str) -> str:
     return re.sub(r"^void softehl_pairs_", r"static \g<0>", shared, count=1, flags=re.MULTILINE)
 
 
-def sizes(page: ElementInterface) -> dict[str, int]:
-    """Constants of a page by the last part of their names."""
-    d = page.definition
+def sizes(interface: ElementInterface) -> dict[str, int]:
+    """Constants of a model by the last part of their names."""
+    d = interface.definition
     return {
         "NODES": d.nodes,
-        "DIMENSION": page.dimension,
+        "DIMENSION": interface.dimension,
         "UNKNOWNS": len(d.unknowns),
         "PARAMETERS": len(d.parameters),
         "DATA": len(d.data),
-        "POINTS": page.points,
+        "POINTS": interface.points,
         "POINT_DATA": len(d.point_data),
         "FIELDS": len(d.fields),
     }
 
 
-def header(page: ElementInterface) -> str:
+def header(interface: ElementInterface) -> str:
     """NAME.h, which C and C++ read."""
-    name, guard = page.name, f"SOFTEHL_{page.name.upper()}_H"
-    constants = [f"    {name.upper()}_{k} = {v}" for k, v in sizes(page).items()]
-    prototypes = [f"/* {_signature(t).meaning} */\n{prototype(page, t)};\n" for t in page.tasks]
+    name, guard = interface.name, f"SOFTEHL_{interface.name.upper()}_H"
+    constants = [f"    {name.upper()}_{k} = {v}" for k, v in sizes(interface).items()]
+    prototypes = [
+        f"/* {_signature(t).meaning} */\n{prototype(interface, t)};\n" for t in interface.tasks
+    ]
     return "\n".join(
         [
-            argument_comment(page),
+            argument_comment(interface),
             f"#ifndef {guard}\n#define {guard}\n\n#include <stddef.h>\n",
             '#ifdef __cplusplus\nextern "C" {\n#endif\n',
             "enum {\n" + ",\n".join(constants) + "\n};\n",
@@ -78,10 +82,10 @@ def header(page: ElementInterface) -> str:
     )
 
 
-def argument_comment(page: ElementInterface) -> str:
+def argument_comment(interface: ElementInterface) -> str:
     """Comment with every argument of a model by its index."""
-    d = page.definition
-    rows = [f"{page.name}: {d.doc}", ""]
+    d = interface.definition
+    rows = [f"{interface.name}: {d.doc}", ""]
     groups = {"p": d.parameters, "data": d.data, "point data": d.point_data}
     rows += [f"u[{k}]  {name}" for k, name in enumerate(d.unknowns)]
     for label, arguments in groups.items():
@@ -131,27 +135,27 @@ def _signature(task: str) -> Signature:
     return _SIGNATURES.get(task, slope)
 
 
-def prototype(page: ElementInterface, task: str) -> str:
-    """C prototype of a function of a page, without the semicolon."""
-    return f"void {page.name}_{task}({ARRAYS}, {_signature(task).outputs})"
+def prototype(interface: ElementInterface, task: str) -> str:
+    """C prototype of a function of a model, without the semicolon."""
+    return f"void {interface.name}_{task}({ARRAYS}, {_signature(task).outputs})"
 
 
-def functions(page: ElementInterface) -> str:
+def functions(interface: ElementInterface) -> str:
     """End of NAME.c: each function hands the quadrature rule to its kernel."""
-    rows = [f"    {', '.join(map(number, row))}," for row in page.rule]
+    rows = [f"    {', '.join(map(number, row))}," for row in interface.rule]
     lines = [
-        f'#include "{page.name}.h"\n',
+        f'#include "{interface.name}.h"\n',
         "static const double rule[] = {\n" + "\n".join(rows) + "\n};\n",
     ]
-    for task in page.tasks:
-        lines += [f"{prototype(page, task)}\n{{", _call(page, task), "}\n"]
+    for task in interface.tasks:
+        lines += [f"{prototype(interface, task)}\n{{", _call(interface, task), "}\n"]
     return "\n".join(lines)
 
 
-def _call(page: ElementInterface, task: str) -> str:
-    s, name = _signature(task), abi.function_name(page.name, task)
+def _call(interface: ElementInterface, task: str) -> str:
+    s, name = _signature(task), abi.function_name(interface.name, task)
     return (
-        f"    {name}(n, {page.points}, 0, X, u, data, p, {s.direction},\n"
+        f"    {name}(n, {interface.points}, 0, X, u, data, p, {s.direction},\n"
         f"        rule, NULL, {s.values}, {s.tangent});"
     )
 

@@ -19,7 +19,7 @@ def library(law: Law, states: StatesOf) -> dict[str, str]:
     r = checked(r, test_states)
     if not r.symmetric:
         r = packed(r, test_states)
-    texts, _ = c_interface.files(r.page, single=True)
+    texts, _ = c_interface.files(r.interface, single=True)
     more, settings = shared.tests(r, states)
     substitutions = {
         **shared.substitutions(r, "*iel"),

@@ -15,10 +15,10 @@ from softehl.codegen.language.material import Law
 
 def module(law: Law, states: StatesOf) -> dict[str, str]:
     """Every file of a material for forms of DOLFINx."""
-    page, small = ElementInterface(point(law)), is_small_strain(law)
-    texts, kernel = c_interface.files(page)
-    references = samples(page, kernel, states(page.definition))
-    substitutions = _substitutions(page, references[0], small)
+    interface, small = ElementInterface(point(law)), is_small_strain(law)
+    texts, kernel = c_interface.files(interface)
+    references = samples(interface, kernel, states(interface.definition))
+    substitutions = _substitutions(interface, references[0], small)
     texts[f"{law.name}_dolfinx.py"] = c_interface.filled(
         c_interface.template("dolfinx.py.in"), substitutions
     )
@@ -29,7 +29,7 @@ def module(law: Law, states: StatesOf) -> dict[str, str]:
     texts["NOTES.md"] = c_interface.filled(c_interface.template("dolfinx.md"), substitutions)
     values = {
         "p": [float(v) for v in references[0].state.parameters],
-        "states": [_state(page, s, small) for s in references],
+        "states": [_state(interface, s, small) for s in references],
     }
     texts["samples.json"] = json.dumps(values) + "\n"
     return texts
@@ -38,11 +38,11 @@ def module(law: Law, states: StatesOf) -> dict[str, str]:
 DOLFINX = Host(material=module)
 
 
-def _substitutions(page: ElementInterface, first: Sample, small: bool) -> dict[str, object]:
-    d = page.definition
+def _substitutions(interface: ElementInterface, first: Sample, small: bool) -> dict[str, object]:
+    d = interface.definition
     pairs = zip(d.parameters, first.state.parameters, strict=True)
     return {
-        "name": page.name,
+        "name": interface.name,
         "parameter_names": {a.name: a.meaning for a in d.parameters},
         "parameters_given": ", ".join(f"{a.name}={float(v):.3g}" for a, v in pairs),
         "state_names": {a.name: a.meaning for a in d.point_data},
@@ -50,17 +50,17 @@ def _substitutions(page: ElementInterface, first: Sample, small: bool) -> dict[s
         "small": small,
         "stress": "Stress of the small strain" if small else "First Piola-Kirchhoff stress P of F",
         "field_count": len(d.fields),
-        "renewed": [0 if k is None else k for k in page.renewed],
-        "renewed_mask": [k is not None for k in page.renewed],
+        "renewed": [0 if k is None else k for k in interface.renewed],
+        "renewed_mask": [k is not None for k in interface.renewed],
         "limit": LIMIT,
         "difference": DIFFERENCE,
     }
 
 
-def _state(page: ElementInterface, s: Sample, small: bool) -> dict[str, object]:
+def _state(interface: ElementInterface, s: Sample, small: bool) -> dict[str, object]:
     """Displacement gradient, state, and expected values of the material law."""
     values, old = s.state.dofs, [float(v) for v in s.state.point_data[0]]
-    new = [v if k is None else s.fields[k] for k, v in zip(page.renewed, old, strict=True)]
+    new = [v if k is None else s.fields[k] for k, v in zip(interface.renewed, old, strict=True)]
 
     def tensor(row: list[float], shear: float) -> list[list[float]]:
         components = {

@@ -57,7 +57,7 @@ class ElementInterface:
 
     @staticmethod
     def of(d: Definition, host: str) -> ElementInterface:
-        """Raises `TargetError` for a page of interpolated fields, which no host can number."""
+        """Raises `TargetError` for a model of interpolated fields, which no host can number."""
         if d.interpolated:
             raise TargetError(
                 f"{d.name} interpolates {d.interpolated} with any number of unknowns: target "
@@ -66,7 +66,7 @@ class ElementInterface:
         return ElementInterface(replace(d, pseudo_load=False, fields_rate=False))
 
     def require(self, host: str, *tasks: str) -> None:
-        """Raise `TargetError` where the page does not offer a task that a host needs."""
+        """Raise `TargetError` where the model does not offer a task that a host needs."""
         missing = [t for t in tasks if t not in self.tasks]
         if missing:
             raise TargetError(
@@ -76,12 +76,12 @@ class ElementInterface:
 
     @property
     def name(self) -> str:
-        """Name of the page, and the first part of the names of its C functions."""
+        """Name of the model, and the first part of the names of its C functions."""
         return self.definition.name
 
     @cached_property
     def tasks(self) -> list[str]:
-        """Tasks that the page offers."""
+        """Tasks that the model offers."""
         return task_outputs.tasks(self.definition)
 
     @property
@@ -108,7 +108,7 @@ class ElementInterface:
 
     @cached_property
     def cell(self) -> Element | None:
-        """Standard element of which the page has nodes, coordinates and rule; None for others."""
+        """Standard element of which the model has nodes, coordinates and rule; None for others."""
         rule = self.definition.rule
         element = cells.of(self.definition.nodes, rule.dimension)
         if element is None or element.dimension != self.dimension or not element.cell.fits(rule):
@@ -206,7 +206,7 @@ class ElementInterface:
 
     @property
     def remembers(self) -> bool:
-        """True where the page renews data of points: history."""
+        """True where the model renews data of points: history."""
         return any(k is not None for k in self.renewed)
 
 

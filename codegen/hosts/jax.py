@@ -16,28 +16,28 @@ from softehl.codegen.hosts.registry import Host
 from softehl.codegen.hosts.test_states import Sample, samples
 
 
-def module(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     """Every file of a module for JAX."""
-    page.require("jax", Task.RESIDUAL, Task.TANGENT)
-    page = with_derivatives(page)
-    texts, kernel = c_interface.files(page)
-    references = samples(page, kernel, states)
-    substitutions = _substitutions(page, references[0])
+    interface.require("jax", Task.RESIDUAL, Task.TANGENT)
+    interface = with_derivatives(interface)
+    texts, kernel = c_interface.files(interface)
+    references = samples(interface, kernel, states)
+    substitutions = _substitutions(interface, references[0])
     texts["jax_ops.cc"] = c_interface.filled(
         c_interface.template("jax.cc"),
-        {**substitutions, "operations": "\n".join(_operations(page))},
+        {**substitutions, "operations": "\n".join(_operations(interface))},
     )
-    parts = "".join(c_interface.template(f"jax_{t}.py.in") for t in _parts(page))
+    parts = "".join(c_interface.template(f"jax_{t}.py.in") for t in _parts(interface))
     module = c_interface.template("jax.py.in").replace("@functions@\n", parts)
-    texts[f"{page.name}_jax.py"] = c_interface.filled(module, substitutions).rstrip() + "\n"
-    texts[f"test_{page.name}.py"] = c_interface.filled(
+    texts[f"{interface.name}_jax.py"] = c_interface.filled(module, substitutions).rstrip() + "\n"
+    texts[f"test_{interface.name}.py"] = c_interface.filled(
         c_interface.template("jax_test.py.in"), substitutions
     )
     texts["equilibrium.py"] = c_interface.filled(
         c_interface.template("equilibrium.py.in"), substitutions
     )
-    if page.cell is not None and page.nodal and not page.free:
-        texts["patch.json"] = _patch_file(page)
+    if interface.cell is not None and interface.nodal and not interface.free:
+        texts["patch.json"] = _patch_file(interface)
     texts["samples.json"] = _sample_file(references)
     texts["Makefile"] = c_interface.filled(c_interface.template("jax.mk"), substitutions)
     texts["NOTES.md"] = c_interface.filled(c_interface.template("jax.md"), substitutions)
@@ -47,29 +47,29 @@ def module(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
 JAX = Host(element=module, material=at_one_point(module))
 
 
-def with_derivatives(page: ElementInterface) -> ElementInterface:
-    """The page with derivatives of its residual by every parameter and datum of the element."""
-    d = page.definition
+def with_derivatives(interface: ElementInterface) -> ElementInterface:
+    """The model with derivatives of its residual by every parameter and datum of the element."""
+    d = interface.definition
     arrays = (("parameters", d.parameters), ("data", d.data))
     by = [(a.name, d.graph.input(array, k)) for array, row in arrays for k, a in enumerate(row)]
     return ElementInterface(replace(d, derivatives=tuple(by)))
 
 
-def _parts(page: ElementInterface) -> list[str]:
-    optional = [t for t in (Task.ENERGY, Task.FIELDS) if t in page.tasks]
+def _parts(interface: ElementInterface) -> list[str]:
+    optional = [t for t in (Task.ENERGY, Task.FIELDS) if t in interface.tasks]
     return [*optional, Task.RESIDUAL]
 
 
-def _tasks(page: ElementInterface) -> list[str]:
-    return [t for t in page.tasks if t != Task.PRODUCT]
+def _tasks(interface: ElementInterface) -> list[str]:
+    return [t for t in interface.tasks if t != Task.PRODUCT]
 
 
-def _operations(page: ElementInterface) -> list[str]:
+def _operations(interface: ElementInterface) -> list[str]:
     """C++ of each operation."""
-    d = page.definition
-    width = {Task.ENERGY: 1, Task.FIELDS: page.points * len(d.fields)}
+    d = interface.definition
+    width = {Task.ENERGY: 1, Task.FIELDS: interface.points * len(d.fields)}
     texts = []
-    for task in _tasks(page):
+    for task in _tasks(interface):
         size = width.get(Task(task), len(d.unknowns)) if task in set(Task) else len(d.unknowns)
         matrix = task == Task.TANGENT
         second = f", K->typed_data() + e * {len(d.unknowns) ** 2}" if matrix else ""
@@ -78,21 +78,22 @@ def _operations(page: ElementInterface) -> list[str]:
             f"{', Result K' if matrix else ''})\n{{\n"
             "    return each(X, u, data, p, [&](std::size_t e, std::ptrdiff_t n, const double *X,\n"
             "        const double *u, const double *data, const double *p) {\n"
-            f"        {page.name}_{task}(n, X, u, data, p, R->typed_data() + e * {size}{second});\n"
+            f"        {interface.name}_{task}(n, X, u, data, p, "
+            f"R->typed_data() + e * {size}{second});\n"
             "    });\n}\n"
-            f"XLA_FFI_DEFINE_HANDLER_SYMBOL({page.name}_{task}_op, {task}, ffi::Ffi::Bind()"
+            f"XLA_FFI_DEFINE_HANDLER_SYMBOL({interface.name}_{task}_op, {task}, ffi::Ffi::Bind()"
             f"{'.Arg<Array>()' * 4}{'.Ret<Array>()' * (1 + matrix)});\n"
         )
     return texts
 
 
-def _substitutions(page: ElementInterface, first: Sample) -> dict[str, object]:
-    d, sizes = page.definition, c_interface.sizes(page)
-    has_energy = Task.ENERGY in page.tasks
+def _substitutions(interface: ElementInterface, first: Sample) -> dict[str, object]:
+    d, sizes = interface.definition, c_interface.sizes(interface)
+    has_energy = Task.ENERGY in interface.tasks
     pairs = zip(d.parameters, first.state.parameters, strict=True)
     return {
-        "name": page.name,
-        "NAME": page.name.upper(),
+        "name": interface.name,
+        "NAME": interface.name.upper(),
         "doc": d.doc.replace("\\", "\\\\").replace('"""', "'''") or "A page.",
         "coordinates": sizes["NODES"] * sizes["DIMENSION"],
         "unknowns": sizes["UNKNOWNS"],
@@ -106,7 +107,7 @@ def _substitutions(page: ElementInterface, first: Sample) -> dict[str, object]:
         "data_names": {a.name: a.meaning for a in d.data},
         "unknown_names": tuple(d.unknowns),
         "field_names": tuple(name for name, _ in d.fields),
-        "tasks": tuple(str(t) for t in _tasks(page)),
+        "tasks": tuple(str(t) for t in _tasks(interface)),
         "limit": LIMIT,
         "difference": DIFFERENCE,
         "parameters_given": ", ".join(f"{a.name}={float(v):.3g}" for a, v in pairs),
@@ -130,18 +131,18 @@ def _sample_file(references: Sequence[Sample]) -> str:
     return json.dumps(values) + "\n"
 
 
-def _patch_file(page: ElementInterface) -> str:
+def _patch_file(interface: ElementInterface) -> str:
     """Patch of cells: coordinates, numbers of unknowns, prescribed values."""
-    assert page.cell is not None
-    mesh = patch_mesh.patch(page.cell)
+    assert interface.cell is not None
+    mesh = patch_mesh.patch(interface.cell)
     number, fixed, initial = (
-        patch_mesh.numbers(page, mesh),
-        patch_mesh.prescribed(page, mesh),
-        patch_mesh.starts(page),
+        patch_mesh.numbers(interface, mesh),
+        patch_mesh.prescribed(interface, mesh),
+        patch_mesh.starts(interface),
     )
-    dofs = [[0] * len(page.definition.unknowns) for _ in mesh.cells]
+    dofs = [[0] * len(interface.definition.unknowns) for _ in mesh.cells]
     for row, cell in zip(dofs, mesh.cells, strict=True):
-        for k, f in enumerate(page.nodal):
+        for k, f in enumerate(interface.nodal):
             for node, dof in enumerate(f.dofs):
                 row[dof] = number[cell[node], k]
     values = {

@@ -27,7 +27,7 @@ PULL, TWIST = 0.2, 0.3
 
 def substitutions(r: Response, element: str) -> dict[str, object]:
     """Values for the templates of a host; element: C expression of the element's number."""
-    page = r.page
+    interface = r.interface
     outputs = _outputs(r)
     small = r.measure is Measure.SMALL
     stress, _, modulus = str(r.measure).partition(" and ")
@@ -36,14 +36,14 @@ def substitutions(r: Response, element: str) -> dict[str, object]:
         "name": r.law.name,
         "NAME": r.law.name.upper(),
         "given": len(r.parameters),
-        "arguments": "".join(arguments(page)),
-        "conditions": "".join(conditions(page, element)),
-        "history": "".join(_history(page)),
-        "state": ", ".join(a.name for a in page.state) or "none",
+        "arguments": "".join(arguments(interface)),
+        "conditions": "".join(conditions(interface, element)),
+        "history": "".join(_history(interface)),
+        "state": ", ".join(a.name for a in interface.state) or "none",
         "outputs": ", ".join(outputs) or "none",
         "output": len(outputs),
         "own": r.first_law_field,
-        "depvar": len(page.state) + len(outputs),
+        "depvar": len(interface.state) + len(outputs),
         "small": ".true." if small else ".false.",
         "properties": "\n".join(rows) or "| | none |",
         "stress": stress,
@@ -59,9 +59,9 @@ def _outputs(r: Response) -> list[str]:
     return [name for name, _ in d.fields[r.first_law_field : len(d.fields) - len(d.history)]]
 
 
-def _history(page: ElementInterface) -> Iterable[str]:
+def _history(interface: ElementInterface) -> Iterable[str]:
     """Lines of C that store the new state."""
-    for k, field in enumerate(page.renewed):
+    for k, field in enumerate(interface.renewed):
         value = f"data[{k}]" if field is None else f"fields[{field}]"
         yield f"    after[{k}] = {value};\n"
 
@@ -74,25 +74,31 @@ def depvar(r: Response) -> list[str]:
 def tests(r: Response, states: StatesOf) -> tuple[dict[str, str], list[float]]:
     """Files of the small host, and values of the constants."""
     d = solid(r.law)
-    page = ElementInterface(replace(d, tasks=(Task.TANGENT, Task.FIELDS)[: 1 + bool(d.fields)]))
-    kernel = compile_model(page.definition)
-    references = samples(page, kernel, host.with_time_step(page, states(page.definition)))
-    settings = host.settings_of(page, references[0])
-    stored = len(page.state) + len(_outputs(r))
-    assert page.cell is not None
+    interface = ElementInterface(
+        replace(d, tasks=(Task.TANGENT, Task.FIELDS)[: 1 + bool(d.fields)])
+    )
+    kernel = compile_model(interface.definition)
+    references = samples(
+        interface, kernel, host.with_time_step(interface, states(interface.definition))
+    )
+    settings = host.settings_of(interface, references[0])
+    stored = len(interface.state) + len(_outputs(r))
+    assert interface.cell is not None
     return {
         "tetrahedron.f90": c_interface.template("tetrahedron.f90"),
-        "host.f90": host.program(page),
-        "samples.txt": host.sample_file(page, references, stored),
-        "patch.txt": host.patch_file(_from_zero(page), patch_mesh.patch(page.cell), settings),
+        "host.f90": host.program(interface),
+        "samples.txt": host.sample_file(interface, references, stored),
+        "patch.txt": host.patch_file(
+            _from_zero(interface), patch_mesh.patch(interface.cell), settings
+        ),
     }, settings
 
 
-def _from_zero(page: ElementInterface) -> ElementInterface:
-    """The page with a state that begins as zero, whatever its example is."""
-    state = {a.name for a in page.state}
-    example = tuple(pair for pair in page.definition.example if pair[0] not in state)
-    return ElementInterface(replace(page.definition, example=example))
+def _from_zero(interface: ElementInterface) -> ElementInterface:
+    """The model with a state that begins as zero, whatever its example is."""
+    state = {a.name for a in interface.state}
+    example = tuple(pair for pair in interface.definition.example if pair[0] not in state)
+    return ElementInterface(replace(interface.definition, example=example))
 
 
 def block(count: int = 2) -> tuple[list[str], list[str], list[str]]:

@@ -56,14 +56,14 @@ class Response:
     symmetric: bool
 
     @property
-    def page(self) -> ElementInterface:
-        """The response as a page without nodes."""
+    def interface(self) -> ElementInterface:
+        """The response as a model without nodes."""
         return ElementInterface(self.definition)
 
     @property
     def parameters(self) -> list[Argument]:
         """Constants of the material: all parameters but the length of the step."""
-        return self.page.inputs
+        return self.interface.inputs
 
     @property
     def first_law_field(self) -> int:
@@ -163,7 +163,7 @@ def _at_rest(d: Definition) -> Definition:
 
 
 def _close(m: Model, law: Material, P: Sequence[Any], F: Sequence[Any]) -> None:
-    """Give the page the potential that every page has; no host asks for its residual."""
+    """Give the model the potential that every model has; no host asks for its residual."""
     if law.W is not None:
         m.potential(m.integral("stored", law.W))
     else:
@@ -224,7 +224,7 @@ def packed(r: Response, states: Sequence[State]) -> Response:
 
 
 def point(law: Law) -> Definition:
-    """The law as a page of one point: the residual is its stress, the tangent its modulus."""
+    """The law as a model of one point: the residual is its stress, the tangent its modulus."""
     small = is_small_strain(law)
     meaning = "Unknowns: strains (shears twice), residual: stress, tangent: modulus."
     if not small:
@@ -270,10 +270,10 @@ def solid(law: Law, name: str = "tet4") -> Definition:
 def at_one_point(
     write: Callable[[ElementInterface, Sequence[State]], Files],
 ) -> Callable[[Law, StatesOf], Files]:
-    """Writer for materials from one for elements: a page of one point, with stress and modulus."""
+    """Writer for materials from one for elements: a model of one point, with stress and modulus."""
 
     def files(law: Law, states: StatesOf) -> Files:
-        page = ElementInterface(point(law))
-        return write(page, states(page.definition))
+        interface = ElementInterface(point(law))
+        return write(interface, states(interface.definition))
 
     return files

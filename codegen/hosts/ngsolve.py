@@ -36,15 +36,15 @@ MESHES = {
 }
 
 
-def module(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     """Every file of the integrator."""
-    kind = _kind(page)
-    texts, kernel = c_interface.files(page, single=True)
-    texts = _many(page) | texts
-    substitutions = _substitutions(page, kind, samples(page, kernel, states)[0])
+    kind = _kind(interface)
+    texts, kernel = c_interface.files(interface, single=True)
+    texts = _many(interface) | texts
+    substitutions = _substitutions(interface, kind, samples(interface, kernel, states)[0])
     texts["ngsolve.cpp"] = c_interface.filled(c_interface.template("ngsolve.cpp"), substitutions)
     texts["form.hpp"] = c_interface.filled(c_interface.template("ngsolve_form.hpp"), substitutions)
-    texts[f"test_{page.name}.py"] = c_interface.filled(
+    texts[f"test_{interface.name}.py"] = c_interface.filled(
         c_interface.template("ngsolve_test.py.in"), substitutions
     )
     texts["Makefile"] = c_interface.filled(c_interface.template("ngsolve.mk"), substitutions)
@@ -55,38 +55,38 @@ def module(page: ElementInterface, states: Sequence[State]) -> dict[str, str]:
 NGSOLVE = Host(element=module)
 
 
-def _many(page: ElementInterface) -> dict[str, str]:
+def _many(interface: ElementInterface) -> dict[str, str]:
     """The tangent again, for many cells at a time, under another name."""
-    d = page.definition
+    d = interface.definition
     again = ElementInterface(replace(d, name=f"{d.name}_many", tasks=(Task.TANGENT,)))
     return c_interface.files(again)[0]
 
 
-def _kind(page: ElementInterface) -> Element:
-    """The cell of the page.  Raises `TargetError`."""
-    page.require("ngsolve", Task.TANGENT)
-    kind = page.cell
+def _kind(interface: ElementInterface) -> Element:
+    """The cell of the model.  Raises `TargetError`."""
+    interface.require("ngsolve", Task.TANGENT)
+    kind = interface.cell
     if kind is None or kind.name not in KINDS:
         raise TargetError(
-            f"{page.name} has {page.definition.nodes} nodes in {page.dimension} coordinates: "
-            f"target ngsolve has spaces for {', '.join(KINDS)}"
+            f"{interface.name} has {interface.definition.nodes} nodes in {interface.dimension} "
+            f"coordinates: target ngsolve has spaces for {', '.join(KINDS)}"
         )
     missing = {
-        "unknowns of the element alone": page.free,
-        "data of points": [a.name for a in page.state],
+        "unknowns of the element alone": interface.free,
+        "data of points": [a.name for a in interface.state],
         "values of a step in time": [
-            s for s in (*page.parameters, *page.data) if not isinstance(s, UserInput)
+            s for s in (*interface.parameters, *interface.data) if not isinstance(s, UserInput)
         ],
     }
     for what, present in missing.items():
         if present:
-            raise TargetError(f"{page.name} has {what}, which target ngsolve cannot hold")
+            raise TargetError(f"{interface.name} has {what}, which target ngsolve cannot hold")
     corners = len(_corners(kind).nodes)
-    partial = [f.name for f in page.nodal if len(f.dofs) not in (corners, len(kind.nodes))]
+    partial = [f.name for f in interface.nodal if len(f.dofs) not in (corners, len(kind.nodes))]
     if partial:
         raise TargetError(
-            f"{page.name}: {partial[0]} is neither at all nodes nor at all corners, as spaces of "
-            "target ngsolve are"
+            f"{interface.name}: {partial[0]} is neither at all nodes nor at all corners, as spaces "
+            "of target ngsolve are"
         )
     return kind
 
@@ -110,73 +110,73 @@ def _mirrored(row: Sequence[float]) -> list[float]:
     return [1 - row[0]] if len(row) == 1 else [row[1], row[0], *row[2:]]
 
 
-def _space(page: ElementInterface, order: int) -> str:
+def _space(interface: ElementInterface, order: int) -> str:
     """The space as a line of Python."""
-    full = page.definition.nodes
+    full = interface.definition.nodes
     parts = []
-    for count, group in groupby(page.nodal, lambda f: len(f.dofs)):
+    for count, group in groupby(interface.nodal, lambda f: len(f.dofs)):
         names = list(group)
         degree = order if count == full else 1
         while names:
-            vector = len(names) >= page.dimension > 1
+            vector = len(names) >= interface.dimension > 1
             parts.append(f"ng.{'VectorH1' if vector else 'H1'}(mesh, order={degree})")
-            names = names[page.dimension if vector else 1 :]
+            names = names[interface.dimension if vector else 1 :]
     return " * ".join(parts)
 
 
-def _substitutions(page: ElementInterface, kind: Element, first: Sample) -> dict[str, object]:
-    d, (name, order) = page.definition, KINDS[kind.name]
+def _substitutions(interface: ElementInterface, kind: Element, first: Sample) -> dict[str, object]:
+    d, (name, order) = interface.definition, KINDS[kind.name]
     parent = _parent(kind)
-    pairs = zip(page.inputs, host.settings_of(page, first), strict=True)
+    pairs = zip(interface.inputs, host.settings_of(interface, first), strict=True)
     settings = {a.name: v for a, v in pairs}
-    has_energy, has_residual = (t in page.tasks for t in (Task.ENERGY, Task.RESIDUAL))
+    has_energy, has_residual = (t in interface.tasks for t in (Task.ENERGY, Task.RESIDUAL))
     return {
-        "name": page.name,
-        "NAME": page.name.upper(),
+        "name": interface.name,
+        "NAME": interface.name.upper(),
         "kind": name,
         "cell": kind.name,
-        "names": len(page.nodal),
-        "unknowns": ", ".join(f.name for f in page.nodal),
+        "names": len(interface.nodal),
+        "unknowns": ", ".join(f.name for f in interface.nodal),
         "nodes": ",\n".join(_braces(parent)),
         "mirrored": ", ".join(str(_index(parent, _mirrored(r))) for r in parent),
-        "counts": ", ".join(str(len(f.dofs)) for f in page.nodal),
-        "places": ",\n".join(f"    {{{', '.join(map(str, f.dofs))}}}" for f in page.nodal),
-        "symmetric": "true" if page.symmetric else "false",
-        "symmetry": ", symmetric=True" if page.symmetric else "",
-        "residual": f"{page.name}_residual(1, e.X, e.u, e.data, e.p, R);"
+        "counts": ", ".join(str(len(f.dofs)) for f in interface.nodal),
+        "places": ",\n".join(f"    {{{', '.join(map(str, f.dofs))}}}" for f in interface.nodal),
+        "symmetric": "true" if interface.symmetric else "false",
+        "symmetry": ", symmetric=True" if interface.symmetric else "",
+        "residual": f"{interface.name}_residual(1, e.X, e.u, e.data, e.p, R);"
         if has_residual
-        else f"double K[U * U];\n        {page.name}_tangent(1, e.X, e.u, e.data, e.p, R, K);",
+        else f"double K[U * U];\n        {interface.name}_tangent(1, e.X, e.u, e.data, e.p, R, K);",
         "energy": f"const Element e = Read(fel, trafo, &elx, lh);\n        double value;\n"
-        f"        {page.name}_energy(1, e.X, e.u, e.data, e.p, &value);\n        return value;"
+        f"        {interface.name}_energy(1, e.X, e.u, e.data, e.p, &value);\n        return value;"
         if has_energy
-        else f'throw Exception("{page.name} has no energy");',
+        else f'throw Exception("{interface.name} has no energy");',
         "parameters": ", ".join(f'"{a.name}"' for a in d.parameters),
         "constants": ", ".join(f'"{a.name}"' for a in d.data),
         "arguments": ", ".join(f"{k}={v:.3g}" for k, v in settings.items()),
-        **_of_test(page, kind, first),
+        **_of_test(interface, kind, first),
         "settings": settings,
-        "space": _space(page, order),
+        "space": _space(interface, order),
         "mesh": MESHES[name],
         "order": order,
     }
 
 
-def _of_test(page: ElementInterface, kind: Element, first: Sample) -> dict[str, Any]:
-    d, corner = page.definition, _corners(kind)
+def _of_test(interface: ElementInterface, kind: Element, first: Sample) -> dict[str, Any]:
+    d, corner = interface.definition, _corners(kind)
     weights = [[float(N) for N in corner.shape(*node)] for node in kind.nodes]
     image = [tuple(_mirrored([float(c) for c in p])) for p in corner.nodes]
     corners = [tuple(float(c) for c in p) for p in corner.nodes]
-    mirror = [corners.index(p) for p in image] if page.dimension > 1 else [1, 0]
-    edges = [_neighbour(corners, k) for k in range(page.dimension)]
+    mirror = [corners.index(p) for p in image] if interface.dimension > 1 else [1, 0]
+    edges = [_neighbour(corners, k) for k in range(interface.dimension)]
     return {
-        "dimension": page.dimension,
+        "dimension": interface.dimension,
         "nodes_count": d.nodes,
         "unknowns_count": len(d.unknowns),
         "corners": weights,
-        "place_lists": [list(f.dofs) for f in page.nodal],
+        "place_lists": [list(f.dofs) for f in interface.nodal],
         "mirror": mirror,
         "jacobian": f"np.array([X[k] - X[0] for k in {edges}])[:, :DIM]",
-        "rest": patch_mesh.starts(page),
+        "rest": patch_mesh.starts(interface),
         "size": 0.02,
         "parameter_values": [float(v) for v in first.state.parameters],
         "data_values": [float(v) for v in first.state.data],

@@ -111,20 +111,20 @@ class Held:
     value: float
 
 
-def starts(page: ElementInterface) -> list[float]:
-    """Value at rest of each name: that of the page's example at node 1, else zero."""
-    example = dict(page.definition.example)
-    names = page.definition.unknowns
-    return [example.get(names[f.dofs[0]], 0.0) for f in page.nodal]
+def starts(interface: ElementInterface) -> list[float]:
+    """Value at rest of each name: that of the model's example at node 1, else zero."""
+    example = dict(interface.definition.example)
+    names = interface.definition.unknowns
+    return [example.get(names[f.dofs[0]], 0.0) for f in interface.nodal]
 
 
-def prescribed(page: ElementInterface, mesh: Patch) -> list[Held]:
+def prescribed(interface: ElementInterface, mesh: Patch) -> list[Held]:
     """Prescribed values on both sides, for every name with unknowns at all nodes."""
-    full = [k for k, f in enumerate(page.nodal) if len(f.dofs) == page.definition.nodes]
-    initial = starts(page)
+    full = [k for k, f in enumerate(interface.nodal) if len(f.dofs) == interface.definition.nodes]
+    initial = starts(interface)
     first = full[0] if full else -1
     pulled = {
-        k: PULL * max(1.0, abs(initial[k])) for k in full if k == first or k not in page.vector
+        k: PULL * max(1.0, abs(initial[k])) for k in full if k == first or k not in interface.vector
     }
     sides = ((mesh.left, dict.fromkeys(full, 0.0)), (mesh.right, pulled))
     return [
@@ -135,12 +135,12 @@ def prescribed(page: ElementInterface, mesh: Patch) -> list[Held]:
     ]
 
 
-def numbers(page: ElementInterface, mesh: Patch) -> dict[tuple[int, int], int]:
+def numbers(interface: ElementInterface, mesh: Patch) -> dict[tuple[int, int], int]:
     """Equation of each (node, number of the name), node after node."""
     occupied: dict[tuple[int, int], None] = {}
     for cell in mesh.cells:
         for node, dof in enumerate(cell):
             occupied.update(
-                {(dof, k): None for k, f in enumerate(page.nodal) if node < len(f.dofs)}
+                {(dof, k): None for k, f in enumerate(interface.nodal) if node < len(f.dofs)}
             )
     return {key: n for n, key in enumerate(sorted(occupied))}

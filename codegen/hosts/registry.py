@@ -1,4 +1,4 @@
-"""Registry of hosts: programs that take a page, by the name of their target.
+"""Registry of hosts: programs that take a model, by the name of their target.
 
 A package registers a host as an entry point of the group `softehl.hosts`, whose object is a `Host`:
 
@@ -38,14 +38,14 @@ BUILT_IN = {
 Files: TypeAlias = dict[str, str]
 """Text of each file of a folder, by its name."""
 StatesOf: TypeAlias = "Callable[[Definition], Sequence[State]]"
-"""States at which a page has values, for the tests of a folder."""
+"""States at which a model has values, for the tests of a folder."""
 
 
 @dataclass(frozen=True)
 class Host:
     """Writers of the files for an element and for a material; None where the host takes none.
 
-    They raise `TargetError` for pages that the program cannot hold.
+    They raise `TargetError` for models that the program cannot hold.
     """
 
     element: Callable[[ElementInterface, Sequence[State]], Files] | None = None

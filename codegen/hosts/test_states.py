@@ -24,7 +24,7 @@ DIGITS = 30
 
 @dataclass(frozen=True)
 class Sample:
-    """One state and its values; empty where the page does not offer the task.
+    """One state and its values; empty where the model does not offer the task.
 
     tangent: row by row. fields: point by point.
     """
@@ -41,7 +41,7 @@ class Sample:
         return [float(v) for row in (self.state.data, *self.state.point_data) for v in row]
 
 
-def sample(page: ElementInterface, kernel: KernelSource, state: State) -> Sample:
+def sample(interface: ElementInterface, kernel: KernelSource, state: State) -> Sample:
     """The values of all tasks at one state."""
     # where the loop over the points is written out, their data stand behind those of the element
     flat = [v for row in (state.data, *state.point_data) for v in row]
@@ -50,15 +50,15 @@ def sample(page: ElementInterface, kernel: KernelSource, state: State) -> Sample
         size = len(state.dofs)
         residual, tangent = [0.0] * size, [0.0] * size**2
         task = Task.TANGENT if Task.TANGENT in kernel.functions else Task.RESIDUAL
-        for x in _entries(page, kernel, task):
+        for x in _entries(interface, kernel, task):
             value = float(walk.value(x.node))
             if x.column is None:
                 residual[x.row.position] = value
             else:
                 tangent[x.row.position * size + x.column.position] = value
-        energy = [float(walk.value(x.node)) for x in _entries(page, kernel, Task.ENERGY)]
-        nodes = [n for _, n in page.definition.fields]
-        fields = [float(walk.at(n, q)) for q in range(page.points) for n in nodes]
+        energy = [float(walk.value(x.node)) for x in _entries(interface, kernel, Task.ENERGY)]
+        nodes = [n for _, n in interface.definition.fields]
+        fields = [float(walk.at(n, q)) for q in range(interface.points) for n in nodes]
     return Sample(
         state,
         energy,
@@ -68,15 +68,17 @@ def sample(page: ElementInterface, kernel: KernelSource, state: State) -> Sample
     )
 
 
-def _entries(page: ElementInterface, kernel: KernelSource, task: str) -> list[Entry]:
+def _entries(interface: ElementInterface, kernel: KernelSource, task: str) -> list[Entry]:
     """Outputs of the whole element, also of a kernel that is made of functions of a point."""
     if task not in kernel.functions:
         return []
     function = kernel.functions[task]
     at_point = function.printer == "points"
-    return outputs(page.definition, task) if at_point else function.best.entries
+    return outputs(interface.definition, task) if at_point else function.best.entries
 
 
-def samples(page: ElementInterface, kernel: KernelSource, states: Sequence[State]) -> list[Sample]:
+def samples(
+    interface: ElementInterface, kernel: KernelSource, states: Sequence[State]
+) -> list[Sample]:
     """The values at several states."""
-    return [sample(page, kernel, s) for s in states]
+    return [sample(interface, kernel, s) for s in states]

@@ -1,1 +1,1 @@
-"""The language of model pages: the model, its symbols, kinematics, shapes and rules."""
+"""The language of models: the model, its symbols, kinematics, shapes and rules."""

@@ -1,4 +1,4 @@
-"""A finished model as one record: what the compiler gets from a model page."""
+"""A finished model as one record: what the compiler gets from a model."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Argument:
 
 @dataclass(frozen=True)
 class Condition:
-    """Condition on a parameter or datum: `name relation bound`, and the page's line."""
+    """Condition on a parameter or datum: `name relation bound`, and the model's line."""
 
     name: str
     relation: str
@@ -52,7 +52,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class PointForm:
-    """A page of fields at a point: `definition` is its model, with one node, the point itself.
+    """A weak form at a point: `definition` is its model, with one node, the point itself.
 
     Its unknowns are values and gradients: `all` says what each is, `unknowns` those that occur, in
     the order of `definition.directions`. data: of those of its data that are interpolated, by
@@ -137,11 +137,11 @@ class Definition:
     point_rates : bool
         Whether point data have rates.
     cell : str
-        Reference cell of a page of fields.
+        Reference cell of a weak form.
     point : PointForm or None
-        The page at a point.
+        The model at a point.
     record : Record
-        The page as it was written, by which kernels are checked.
+        The model as it was written, by which kernels are checked.
     """
 
     name: str
@@ -182,11 +182,11 @@ class Definition:
     point_rates: bool = False
     """Whether the second half of the point data says how the first moves along a variation."""
     cell: str = ""
-    """The cell of a page of fields, which could stand on another one, too."""
+    """The cell of a weak form, which could stand on another one, too."""
     point: PointForm | None = field(default=None, compare=False)
-    """The same page at a point, from which the kernel of the whole element can be made as well."""
+    """The same model at a point, from which the kernel of the whole element can be made as well."""
     record: SympyTape = field(default_factory=SympyTape, repr=False, compare=False)
-    """The page as written, by which kernels are checked; nothing is derived from it."""
+    """The model as written, by which kernels are checked; nothing is derived from it."""
 
     def __repr__(self) -> str:
         """Summary in one line."""

@@ -1,4 +1,4 @@
-"""Errors and warnings about a page, with its file and line."""
+"""Errors and warnings about a model, with its file and line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class ModelError(SoftehlError, ValueError):
     """A model has something that no kernel can hold; the message names it and its line.
 
     `where` is the file and line; left out, it is found among the callers: the first one that is
-    not the generator itself (a model that ships is a page like any other). text: without it.
+    not the generator itself (a model that ships is a model like any other). text: without it.
     """
 
     def __init__(self, message: str, where: str | None = None) -> None:
@@ -26,7 +26,7 @@ _CODEGEN = Path(__file__).resolve().parents[1]
 
 
 def page_line() -> str:
-    """File and line of the model page that is being read, e.g. `my_model.py:12`."""
+    """File and line of the model that is being read, e.g. `my_model.py:12`."""
     frame: FrameType | None = sys._getframe(1)
     while frame is not None:
         path = Path(frame.f_code.co_filename).resolve()
@@ -42,11 +42,11 @@ class ModelWarning(UserWarning):
 
 
 _WARNED: dict[str | tuple[str, type[Warning], int], int] = {}
-"""What Python's warnings remember, so that a page that is read again does not warn again."""
+"""What Python's warnings remember, so that a model that is read again does not warn again."""
 
 
 def warn_page(message: str) -> None:
-    """A `ModelWarning` with the page's line."""
+    """A `ModelWarning` with the model's line."""
     file, _, line = page_line().rpartition(":")
     warnings.warn_explicit(message, ModelWarning, file, int(line or 0), registry=_WARNED)
 
@@ -59,7 +59,7 @@ class NeedsElementError(ModelError):
 
 
 class NoEquationsError(ModelError):
-    """A page states no equations."""
+    """A model states no equations."""
 
 
 class WrongDomainError(ModelError):

@@ -14,7 +14,7 @@ from softehl.codegen.language.errors import ModelError
 
 
 class Matrix(sp.MutableDenseMatrix):  # type: ignore[misc]
-    """Matrix of a page: its inverse is written out up to 3x3.
+    """Matrix of a model: its inverse is written out up to 3x3.
 
     SymPy eliminates, and looks for proof that a pivot is not zero: minutes for names of sums.
     """
@@ -95,7 +95,7 @@ def call_function(name: str, function: Callable[..., Any], *arguments: Any, writ
 
 
 def fraction(value: Any, *, zero: bool = False) -> Fraction:
-    """An exact number > 0 of a model page (a setting, so that a float does as well), or `zero`."""
+    """An exact number > 0 of a model (a setting, so that a float does as well), or `zero`."""
     number = sp.nsimplify(value, rational=True)
     if not number.is_Rational or number < 0 or (number == 0 and not zero):
         raise ModelError(f"{value} must be a number {'>=' if zero else '>'} 0")

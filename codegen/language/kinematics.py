@@ -53,7 +53,7 @@ def isoparametric(m: Model, X: Any, parent: Any, label: str = "") -> Isoparametr
         Gradients of the shape functions in the cell, such as
         `element("hex8").gradient(*m.point())`.
     label : str
-        Begins the names dX, detJ, dX_inverse and dN, for pages that use these names.
+        Begins the names dX, detJ, dX_inverse and dN, for models that use these names.
 
     Returns
     -------

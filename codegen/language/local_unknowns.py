@@ -29,7 +29,7 @@ from softehl.codegen.language.sympy_lowering import Symbols
 
 @dataclass(frozen=True)
 class Iteration:
-    """Settings of a local Newton iteration as a page gives them (`Model.implicit`)."""
+    """Settings of a local Newton iteration as a model gives them (`Model.implicit`)."""
 
     tolerance: float
     size: float
@@ -92,7 +92,7 @@ def written_out(
 ) -> list[Node]:
     """Equations with integrals of the unknowns as sums of one term for each point.
 
-    prescribed: values whose derivatives a page gives.
+    prescribed: values whose derivatives a model gives.
     """
     inside = depends(values, unknowns)
     if any(v.varying for v in values):

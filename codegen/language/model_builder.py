@@ -177,7 +177,7 @@ class Arguments:
         return [a.name for array in arrays for a in self.lists[array]]
 
     def require(self, conditions: Iterable[Any]) -> None:
-        """Conditions on parameters and data, with the line of the page."""
+        """Conditions on parameters and data, with the line of the model."""
         declared = self.names("parameters", "data")
         for c in conditions:
             if isinstance(c, sp.core.relational.Relational) and c.lhs.is_number:
@@ -306,7 +306,7 @@ class Equations:
 class Intermediates:
     """Names for values. interface: those that derivatives are taken through.
 
-    prescribed: derivatives that a page gives instead of the true ones.
+    prescribed: derivatives that a model gives instead of the true ones.
     """
 
     def __init__(self, symbols: Symbols) -> None:

@@ -3,7 +3,7 @@
 The result of `Model.define` stands for an expression.  To SymPy a plain symbol would be a constant:
 `sp.diff(W, x)` of a W that uses a name of something with x in it would lose a term, and so would
 `subs`.  A `Name` follows its definition there, or refuses where it has none (a local unknown, an
-integral, ...).  `ExpandedName` does the same in another way, for the second reading of a page by
+integral, ...).  `ExpandedName` does the same in another way, for the second reading of a model by
 which its kernels are checked: the definition stands in the tree of the expression, where SymPy
 finds it.
 """
@@ -73,7 +73,7 @@ def _direct(value: Any) -> set[Any]:
 
 
 def _refuse_truth(symbol: Any, other: object) -> None:
-    """Raise where a page compares a name with a number by == or !=: the answer is always no."""
+    """Raise where a model compares a name with a number by == or !=: the answer is always no."""
     if isinstance(other, (int, float, sp.Number)):
         caller = str(sys._getframe(2).f_globals.get("__name__", ""))
         page = caller.startswith("softehl.codegen.models")

@@ -1,4 +1,4 @@
-"""A page of fields with sums over the nodes of a cell or side: what both have in common."""
+"""A weak form with sums over the nodes of a cell or side: what both have in common."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class NodalFields(Fields):
         """Slopes of a component at the point from its values at the nodes."""
 
     def point(self) -> list[sp.Symbol]:
-        """Parent coordinates, under names that a page does not use."""
+        """Parent coordinates, under names that a model does not use."""
         names = (f"parent_{k}" for k in range(self.rule.dimension))
         return [self._symbols.input(s, "rule", k, varying=True) for k, s in enumerate(names)]
 

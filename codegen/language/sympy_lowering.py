@@ -302,7 +302,7 @@ class Lowering:
 
 
 class Symbols:
-    """All symbols of one model, its graph, and the record of the page; each label is used once."""
+    """All symbols of one model, its graph, and the record of the model; each label is used once."""
 
     def __init__(self, model: str) -> None:
         self.model = model

@@ -1,4 +1,4 @@
-"""Record of a model page as its SymPy expressions, for the check of its kernels.
+"""Record of a model as its SymPy expressions, for the check of its kernels.
 
 A kernel is checked against an evaluation of these expressions that shares neither the conversion
 to a graph nor anything after it (`verify.sympy_program`). The model only records them.

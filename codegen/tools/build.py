@@ -50,13 +50,13 @@ LARGE, LIGHT = 20_000, "-O1"
 """Operations in a file above which more than -O1 costs minutes, and the code gets slower."""
 SHARED_LARGE = 2_500
 SHARED_LIGHT = (LIGHT, "-fschedule-insns2", "-fgcse", "-fpeephole2")
-"""The same for loops that pages share: hex27 takes half the time to compile and 1 % more to run;
+"""The same for loops that models share: hex27 takes half the time to compile and 1 % more to run;
 hex8 (1900 operations) would take 4 % more."""
 OPERATORS = (" + ", " - ", " * ", " / ")
 STRICT = ("-Wall", "-Wextra", "-Werror")
 """For our own tests alone: another compiler may warn of what ours does not."""
 SHARED = "pairs_"
-"""Beginning of the names of sources that know nothing of the page and are compiled once."""
+"""Beginning of the names of sources that know nothing of the model and are compiled once."""
 _OBJECT, _SUM = "shared.o", "shared.o.sha256"
 LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
 DIGEST = f"{LIBRARY}.sha256"

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 CellKey: TypeAlias = "tuple[tuple[str, ...], str, bool]"
-"""Cells and geometry ("": the usual one) of pages of fields, and whether materials are wanted."""
+"""Cells and geometry ("": the usual one) of weak forms, and whether materials are wanted."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def folder_of(
 ) -> Path:
     """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived).
 
-    where: cells and geometry of pages of fields, and whether materials are wanted. derivatives:
+    where: cells and geometry of weak forms, and whether materials are wanted. derivatives:
     the kernels of `Definition.for_derivatives` instead.
     """
     cells, geometry, materials = where

@@ -59,7 +59,7 @@ _IN_SYMPY = {"fabs": "Abs", "abs": "Abs", "absolute": "Abs", "pow": "Pow", "powe
 def definitions(path: Path, on: CellOptions = DEFAULT_CELL) -> list[Definition]:
     """The models of a file, which is run; raises `ModelFileError`.
 
-    on: where its pages of fields stand.
+    on: where its weak forms stand.
     """
     return definitions_and_inputs(path, on)[0]
 
@@ -110,8 +110,8 @@ def written_out(
 ) -> dict[str, Definition]:
     """The models of a file that is run again, with names as `language.named_symbols.ExpandedName`.
 
-    A page that loses a dependence through a name, because SymPy took it for a constant, says
-    something else then. Empty where SymPy cannot do with such names what the page asks for, or not
+    A model that loses a dependence through a name, because SymPy took it for a constant, says
+    something else then. Empty where SymPy cannot do with such names what the model asks for, or not
     in so many seconds.
     """
     try:
@@ -227,7 +227,7 @@ def _made(entry: Any, on: CellOptions) -> list[Definition | Law]:
 
 @contextmanager
 def errors_of(page: Page) -> Iterator[None]:
-    """As for a model file, what went wrong while a page of a script ran; ModelError stays."""
+    """As for a model file, what went wrong while a model of a script ran; ModelError stays."""
     try:
         yield
     except ModelError:

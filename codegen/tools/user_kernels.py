@@ -76,7 +76,7 @@ def generate(
 ) -> int:
     """Exit code: 0 done, 1 a tangent is off or (`check`) something is stale, 2 no such model.
 
-    The check of each kernel takes at most so many `seconds`. on: where pages of fields stand.
+    The check of each kernel takes at most so many `seconds`. on: where weak forms stand.
     Raises `ModelFileError`, `NoStateError`, `BuildError`, `CacheError`, OSError.
     """
     groups = [(list(paths), out)] if out else [([p], default_folder(p)) for p in paths]

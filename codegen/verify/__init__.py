@@ -1,1 +1,1 @@
-"""Verification: kernels compared with exact evaluations of the page and with themselves."""
+"""Verification: kernels compared with exact evaluations of the model and with themselves."""

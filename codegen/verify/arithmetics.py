@@ -1,4 +1,4 @@
-"""Three arithmetics for the evaluation of a page: exact, rounded as doubles are, and doubles.
+"""Three arithmetics for the evaluation of a model: exact, rounded as doubles are, and doubles.
 
 `Exact` has 90 digits: sums, products and quotients are decimals, functions those of mpmath.
 `Rounded` is the same where every operation is off by a relative error of the size that a double

@@ -1,6 +1,6 @@
 """Quick check of a kernel before its first use: a few calls, compared with differences.
 
-`softehl generate` compares kernels with their pages in 90 digits (`verification`), which takes
+`softehl generate` compares kernels with their models in 90 digits (`verification`), which takes
 seconds.  Here a kernel is compared with itself, at ordinary states: all tasks are numbers, the
 residual is the slope of the energy, the tangent is that of the residual.
 """

@@ -1,4 +1,4 @@
-"""Values and derivatives of a page as written, in one of the arithmetics of `arithmetics`.
+"""Values and derivatives of a model as written, in one of the arithmetics of `arithmetics`.
 
 Derivatives are central differences of values: the residual that of the potential with the frozen
 quantities held, the tangent that of the residual. Local equations are solved by Newton's method
@@ -39,7 +39,7 @@ class OutOfTimeError(Exception):
 
 
 class NotRealError(ArithmeticError):
-    """The page has no real value at a state."""
+    """The model has no real value at a state."""
 
 
 @dataclass(frozen=True)
@@ -390,7 +390,7 @@ def _in_digits(function: Callable[P, T]) -> Callable[P, T]:
 
 
 class ReferenceTasks:
-    """The page at one state; `exact.NotRealError` where it has no real value.
+    """The model at one state; `exact.NotRealError` where it has no real value.
 
     Every result is that of a task; `along` are combinations of rows.
     """
@@ -447,7 +447,7 @@ class ReferenceTasks:
     def rounding(self, order: int, changes: float) -> float:
         """Error of a derivative of this order by the unknowns if the potential is rounded once.
 
-        The page is taken to change so many times within the size of the unknowns.
+        The model is taken to change so many times within the size of the unknowns.
         """
         size = max(abs(float(u)) for u in self.state.dofs) or 1.0
         return UNIT * float(self.base.largest()) * (changes / size) ** order

@@ -2,7 +2,7 @@
 
 Far states have unknowns, parameters, data and coordinates at scales from 1e-3 to 1e3 of the
 ordinary ones, of both signs; unknowns also as a linear field over the nodes, in which an element
-stays sound at large strain. Steered states make the page change its behaviour: each condition is
+stays sound at large strain. Steered states make the model change its behaviour: each condition is
 met on both sides, far from it and near it, and the argument of each function that saturates or
 repeats is below -4, near 0 and above 4 (beyond pi; tanh, erf and exp are constant there to 2 %).
 They are found by a line search in doubles: along the argument by which a condition changes most,
@@ -52,7 +52,7 @@ class ProbedState:
 
 @dataclass
 class StateSearch:
-    """Far and steered states of one page, from an ordinary one."""
+    """Far and steered states of one model, from an ordinary one."""
 
     program: Program
     nominal: Sequence[State]
@@ -99,7 +99,7 @@ class StateSearch:
     # probing ------------------------------------------------------------------------------------
 
     def probe(self, state: State) -> ProbedState | None:
-        """The state in doubles; None without real values, or if the page forbids it."""
+        """The state in doubles; None without real values, or if the model forbids it."""
         self.late = self.late or perf_counter() > self.evaluator.deadline
         if self.late or not _allowed(self.d, state):
             return None
@@ -155,7 +155,7 @@ class StateSearch:
         return self._arguments(state, signs=mode == 4) if mode in (3, 4) else state
 
     def _size(self, k: int, value: Any) -> float:
-        """Size of an unknown: that of the page's example, or 1."""
+        """Size of an unknown: that of the model's example, or 1."""
         names = self.d.unknowns
         return abs(float(value)) if k < len(names) and names[k] in dict(self.d.example) else 1.0
 

@@ -1,4 +1,4 @@
-"""A page as written, as a list of operations: each SymPy expression once, operands first.
+"""A model as written, as a list of operations: each SymPy expression once, operands first.
 
 This is made from the expressions that `language.sympy_tape` has noted, not from the graph of the
 compiler. `reference_evaluator` defines the operations; here is only their order, and what each
@@ -51,7 +51,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Switch:
-    """Switch of a page's behaviour at `slot` > `other`, as the page has it in `text`."""
+    """Switch of a model's behaviour at `slot` > `other`, as the model has it in `text`."""
 
     slot: int
     other: int | None
@@ -61,7 +61,7 @@ class Switch:
 
 @dataclass
 class Program:
-    """All operations of a page; `main` are those without local unknowns.
+    """All operations of a model; `main` are those without local unknowns.
 
     potentials: slot and frozen slots of each; fields: slot of each.
     """
@@ -90,7 +90,7 @@ class Program:
 
 
 def program(d: Definition) -> Program:
-    """The operations of a page."""
+    """The operations of a model."""
     made = _Builder(d.record)
     out = Program(d)
     for expression, frozen in d.record.potentials:

@@ -1,7 +1,7 @@
-"""Compare compiled kernels with the page as written: what `softehl generate` reports.
+"""Compare compiled kernels with the model as written: what `softehl generate` reports.
 
 The C is called through ctypes on a batch, so that full groups of lanes and the remainder are
-both covered. It is compared with an evaluation of the page's own SymPy expressions in 90 digits,
+both covered. It is compared with an evaluation of the model's own SymPy expressions in 90 digits,
 which differentiates numerically (`reference_evaluator`) and shares nothing with the compiler, not
 even the conversion to a graph. First at an ordinary state (`random_states`), row by row, then at
 far and steered ones (`state_search`), until all are done or the time is over.
@@ -14,8 +14,8 @@ Derivatives by an argument: over the largest component.  Energy: over |Pi| or ma
 Each field: over its largest value at the points.  No scale is below 1e-6 of the largest of its
 kind (1e-6 for fields), so that zeros may be rounded.
 
-Far from the ordinary state a page may cancel so many digits that no evaluation in doubles is good
-to 1e-10. There the page is evaluated once more with a rounding error in every operation
+Far from the ordinary state a model may cancel so many digits that no evaluation in doubles is good
+to 1e-10. There the model is evaluated once more with a rounding error in every operation
 (`arithmetics.Rounded`), and the kernel may be off by `ROUNDINGS` times what this changes. A state
 where it changes more than `LOST` of a value, or has no value in the range of doubles, says nothing.
 """
@@ -56,7 +56,7 @@ FLOOR = 1e-6
 SHOWN = 5
 """Unreached places that are named; of others their number is told."""
 ROUNDINGS = 1000
-"""A kernel has other operations than its page, and their errors add up."""
+"""A kernel has other operations than its model, and their errors add up."""
 LOST = 1e-6
 """Part of a value: where one rounding of each operation changes more, nothing is compared."""
 
@@ -66,7 +66,7 @@ class Report:
     """Result of the check of one kernel.
 
     errors: the largest of each task. compared: states. unreal, unsolved, unclear: states left out
-    because the page has no real value there, a local iteration has no solution, or doubles cannot
+    because the model has no real value there, a local iteration has no solution, or doubles cannot
     hold the result. missing: conditions that no state met, in words; tasks: those that were
     compared at no state. late: whether time was short.
     """
@@ -192,7 +192,7 @@ class Comparison:
 
 
 class _View:
-    """One element of a batch and the page at its state."""
+    """One element of a batch and the model at its state."""
 
     def __init__(
         self, d: Definition, called: Batch, e: int, left: list[Vector], page: ReferenceTasks
@@ -209,7 +209,7 @@ class _View:
         return max(map(finite, errors), default=0.0)
 
     def change(self, task: str, other: ReferenceTasks) -> float:
-        """Largest difference between the page and another evaluation of it, over the scale."""
+        """Largest difference between the model and another evaluation of it, over the scale."""
         exact = self.expected(task, self.page)
         reference = self.expected(task, other)
         scale = self.scales(task, exact)
@@ -259,7 +259,7 @@ class _View:
         return [[K[n * i + j] * w[j] for j in range(n)] for i in range(n)]
 
     def expected(self, task: str, page: ReferenceTasks) -> Vector:
-        """Values of the page, in the order of the kernel."""
+        """Values of the model, in the order of the kernel."""
         key = (id(page), task)
         if key not in self._memo:
             self._memo[key] = [_double(v) for v in self._expected(task, page)]
@@ -340,7 +340,7 @@ def _double(v: Any) -> float:
 
 
 def idle(comparison: Comparison) -> Iterator[str]:
-    """Rows of the residual that a page fills and that were zero at every state, in words."""
+    """Rows of the residual that a model fills and that were zero at every state, in words."""
     for k in sorted(comparison.program.moved() - comparison.moving):
         yield f"the residual of {comparison.d.unknowns[k]} other than zero"
 
@@ -369,9 +369,9 @@ def check(
     written: Definition | None = None,
     seconds: float = SECONDS,
 ) -> Report:
-    """Compare one kernel with its page; NoStateError if no admissible state is found.
+    """Compare one kernel with its model; NoStateError if no admissible state is found.
 
-    The page is `written`, the same one with its names written out (`model_loader.written_out`), if
+    The model is `written`, the same one with its names written out (`model_loader.written_out`), if
     there is one. If it gives a derivative of its own, only energy and fields can be compared.
     """
     start = perf_counter()
@@ -402,7 +402,7 @@ def check(
 
 
 def undefined_expression(d: Definition, task: str) -> str | None:
-    """Expression without a value in a task whose result is not a number, for the page's author."""
+    """Expression without a value in a task whose result is not a number, for the model's author."""
     gradients = gradient(
         d.graph, d.potential, d.directions, constant=d.constant, prescribed=d.prescribed
     )

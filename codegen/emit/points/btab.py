@@ -19,7 +19,7 @@ from softehl.codegen.emit.points.point_layout import Layout
 from softehl.codegen.language.definition import Component, Quantity
 
 STEM = "pairs_"
-"""Beginning of the names of files that pages share, and of what is in them."""
+"""Beginning of the names of files that models share, and of what is in them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ the fastest for small elements, and the slowest to build and to run for large on
 are estimated from those at a point: looking at the element as a whole saves about a third, on
 every cell that was measured.
 
-The tangent is assembled from pulled-back moduli in a C file that knows nothing of the page: pages
+The tangent is assembled from pulled-back moduli in a C file that knows nothing of the model: models
 with the same fields on the same cell share it, so that it is compiled once.
 
 Values at the centroid are inputs of the function of a point. Their function is called once, before
@@ -317,7 +317,7 @@ def _store_by_ranks(out: Lines, layout: Layout, *, symmetric: bool) -> None:
 
 @dataclass(frozen=True)
 class KernelText:
-    """C text of a kernel, the number of its temporaries, and a file that pages share, if any."""
+    """C text of a kernel, the number of its temporaries, and a file that models share, if any."""
 
     text: str
     temporaries: int
@@ -360,14 +360,14 @@ On tet10 (12,600): 1.1 times, and 0.6 s instead of 5, with a third of the C.
 
 @dataclass(frozen=True)
 class Choice:
-    """The chosen form of a page, and why."""
+    """The chosen form of a model, and why."""
 
     at_points: bool
     why: str
 
 
 def choose(layout: Layout, tangent: PointOutputs, operations: int, short: int) -> Choice:
-    """The form of a page. operations: of the moduli at a point; short: up to which whole pays.
+    """The form of a model. operations: of the moduli at a point; short: up to which whole pays.
 
     tangent: moduli that are not zero.
     """

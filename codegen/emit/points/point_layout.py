@@ -1,4 +1,4 @@
-"""Places of unknowns, data and quantities of a page of fields, in the cell and at the point."""
+"""Places of unknowns, data and quantities of a weak form, in the cell and at the point."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Layout:
 
     @cached_property
     def components(self) -> list[Component]:
-        """Unknown components, in the order of the page."""
+        """Unknown components, in the order of the model."""
         some = [q for k, q in enumerate(self.form.all) if k not in self.form.centroid]
         return list(dict.fromkeys(q.component for q in some))
 

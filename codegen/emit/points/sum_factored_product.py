@@ -1,6 +1,6 @@
 """The tangent times a vector by sum factorisation, without a matrix: `keep` and `action`.
 
-On quadrilaterals and hexahedra of any order, for pages whose fields all have the order of the cell.
+On quadrilaterals and hexahedra of any order, for models whose fields have the order of the cell.
 `keep` computes once a state the cache of a product at every quadrature point (`PointCache`): the
 inverse Jacobian, the volume, and the inputs of the function of the point (gradients, data,
 history). `action` adds the product for a range of elements: values from the nodes to the points,
@@ -13,7 +13,7 @@ one direction after the other, gradients there, fluxes, and all of it back.
 first, last: elements, multiples of 8. kept: by groups of lanes, [group][point][number][lane].
 index: that in x of the first unknown of nodes with x running first, then y, then z, by groups of
 8 elements: [group][node][element]. x, y: unknowns of a node are neighbours, in the order of the
-page; behind the last one of x stand 3 numbers that are read and not used.
+model; behind the last one of x stand 3 numbers that are read and not used.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ def scatter(components: int, nodes: int) -> list[str]:
 
 
 def fits(layout: Layout) -> bool:
-    """True if a page has a product by sum factorisation on its cell."""
+    """True if a model has a product by sum factorisation on its cell."""
     shape, cell = layout.geometry, layout.d.cell
     if layout.form.centroid:
         return False
@@ -212,7 +212,7 @@ def fits(layout: Layout) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Factored:
-    """The functions of a page whose product at a point has these outputs."""
+    """The functions of a model whose product at a point has these outputs."""
 
     layout: Layout
     outputs: PointOutputs
