@@ -31,7 +31,16 @@ INNER = {
         *("Engine", "Kinematics", "NonlinearProblem"),
     },
     "records between a public class and its own methods": {
-        *("Affine", "Call", "Located", "NewtonState", "On", "Pattern", "PointForm", "Step"),
+        *(
+            "Affine",
+            "Call",
+            "CellOptions",
+            "Located",
+            "NewtonState",
+            "Pattern",
+            "PointForm",
+            "Step",
+        ),
     },
 }
 """Classes in annotations that no user makes or keeps."""
