@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import softehl
 from softehl.cases.cycle import CASE, Cycle, cycle_row
@@ -18,8 +19,10 @@ from softehl.cases.seal.cycle.cycle_driver import Films
 from softehl.cases.seal.cycle.motion import Motion, RodFilm, Table
 from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.equations.definition import FILM, PRESSURE, SQUEEZE, VOID
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.cycle import (
     loop_figure,
+    write_animation,
 )
 from softehl.cases.slider.film import Oil, Strip
 from softehl.runtime.arrays import Array
@@ -320,3 +323,32 @@ def test_the_loop_closes_and_costs_what_the_table_says() -> None:
     legend = axes.get_legend()
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == [f"{k}: 8 mJ" for k in loops]
+
+
+def film_and_loop(times: int = 12, nodes: int = 9) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Tables of a made-up cycle: h = 1 + x^2 + t um, friction 2 N against the rod."""
+    t, x = np.linspace(0.1, 1.0, times), np.linspace(-1.0, 1.0, nodes)
+    h = 1.0 + x**2 + t[:, None]
+    film = {
+        "t_s": np.repeat(t, nodes),
+        "x_mm": np.tile(x, times),
+        "h_um": h.ravel(),
+        "p_MPa": np.tile(1.0 - x**2, times),
+    }
+    U = 10.0 * np.cos(2.0 * np.pi * t)
+    loop = {"t_s": t, "rod_speed_mm_s": U, "place_mm": np.sin(t), "friction_N": 2.0 * np.sign(U)}
+    return film, loop
+
+
+def test_an_animation_moves(tmp_path: Path) -> None:
+    film, loop = film_and_loop()
+    p, angle = Seal(), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    outline = {
+        "t_s": np.repeat([0.1, 1.0], 40),
+        "z_mm": np.tile(1.7 * np.cos(angle), 2),
+        "r_mm": np.concatenate([26.6 + 1.5 * np.sin(angle), 26.6 + 1.4 * np.sin(angle)]),
+    }
+    write_animation(tmp_path / "cycle.gif", p, film, loop, outline)
+    with Image.open(tmp_path / "cycle.gif") as image:
+        assert getattr(image, "n_frames", 1) >= 12
+    assert [path.name for path in tmp_path.iterdir()] == ["cycle.gif"]

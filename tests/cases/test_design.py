@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -184,3 +185,25 @@ def test_a_held_film_follows_a_key_further_than_one_solve() -> None:
     after = quantities(moved, at_once.x)[quantity].value
     changed = held_film.change(quantity, "rod_diameter", 0.997)
     assert changed == pytest.approx(after / before, rel=1e-7)
+
+
+def test_a_design_is_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What to change, what a hundredth of a millimetre of it does, and all other results."""
+    page = tmp_path / "design.html"
+    given = ["ring=36x4", "rod=36", "material=NBR 70", "density=1", "speeds=400", "stroke=out"]
+    told_to = [word for text in given for word in ("--set", text)]
+    typed = ["design", "oring", "friction -5%", "--by", "groove_depth", *told_to]
+    assert main([*typed, "--report", str(page)]) == 0
+    printed = capsys.readouterr()
+    assert "film at +400 mm/s" in printed.err  # it tells what it does meanwhile
+    depth = re.search(r" by groove_depth = (\S+) mm", printed.out)
+    assert depth
+    text = page.read_text(encoding="utf-8")
+    assert "of NBR 70, a rod seal: groove depth for friction -5\N{NO-BREAK SPACE}%</h1>" in text
+    assert f"groove depth {float(depth[1]):.5g} mm instead of 3.5 mm" in text
+    assert re.search(r"0\.01 mm more groove depth there: friction -[12]\.\d %", text)
+    rows = re.findall(r"<td[^>]*>friction</td><td>(\S+)</td><td>(\S+)</td>", text)
+    before, after = map(float, rows[-1])
+    assert after / before == pytest.approx(0.95, abs=1e-3)
+    outside = re.sub(r"<(script|details).*?</\1>", "", text, flags=re.DOTALL)
+    assert not re.search(r"h_star|p_max|contact_width", outside)

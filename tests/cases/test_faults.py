@@ -247,7 +247,13 @@ def run_slowly(folder: str) -> None:
     sys.exit(softehl.main(["run", "oring", *FAST, "--quiet", "--out", folder]))
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGTERM,
+        *(pytest.param(n, marks=pytest.mark.slow) for n in (signal.SIGHUP, signal.SIGINT)),
+    ],
+)
 def test_a_signal_ends_a_run_with_a_word(number: signal.Signals, tmp_path: Path) -> None:
     folder = tmp_path / "a"
     process = multiprocessing.get_context("spawn").Process(target=run_slowly, args=(str(folder),))

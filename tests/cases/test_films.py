@@ -123,7 +123,9 @@ def test_a_mesh_that_does_not_fit_is_made_anew_and_h_star_moves_to_its_limit() -
     assert 1e3 * film.numbers.h_star != pytest.approx(0.0403, rel=5e-3)
 
 
-@pytest.mark.parametrize(("bound", "density"), [(1.0, 2), (3.0, 5)], ids=["small", "large"])
+@pytest.mark.parametrize(
+    ("bound", "density"), [(1.0, 2), pytest.param(3.0, 5, marks=pytest.mark.slow)]
+)
 def test_a_film_with_a_large_error_is_solved_on_finer_meshes(
     monkeypatch: pytest.MonkeyPatch, bound: float, density: int
 ) -> None:

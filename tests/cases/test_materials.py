@@ -207,3 +207,17 @@ def test_locking_is_seen_by_the_stability_check() -> None:
     assert test == "biaxial"
     # I1 = 2 l^2 + l^-4 = 4 at l = 1.36; pressed, the same at l^-2
     assert min(stretch, 1.0 / stretch) < 0.8
+
+
+def test_a_modulus_follows_the_temperature_of_the_tests(tmp_path: Path) -> None:
+    path = tmp_path / "warm.csv"
+    lines = ["test,stretch,stress_MPa,temperature_degC"]
+    for heat, factor in ((20, 1.0), (60, 0.8), (100, 0.7)):
+        for stretch in np.linspace(1.1, 2.0, 8):
+            lines.append(f"uniaxial,{stretch},{2 * factor * (stretch - stretch**-2)},{heat}")
+    path.write_text("\n".join(lines), encoding="utf-8")
+    for at, modulus in ((20.0, 2.0), (60.0, 1.6), (80.0, 1.5)):
+        p = Seal(material="neo-hooke", fit=str(path), temperature=at)
+        assert p.shear_modulus == pytest.approx(modulus, rel=1e-6)
+    assert "20 to 100 degC" in refused(material="neo-hooke", fit=str(path), temperature=120.0)
+    assert "the temperature of" in refused(material="neo-hooke", fit=str(path))

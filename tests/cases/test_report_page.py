@@ -157,3 +157,67 @@ def _thinnest(folder: Path, speed: int) -> float:
     from softehl.runtime.io import read_table
 
     return float(read_table(folder / f"profile_1_{speed}.csv")["h_um"].min())
+
+
+LARGEST = 5_000_000
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep of two keys of the seal, two values each."""
+    place = tmp_path_factory.mktemp("sweep")
+    study = place / "study.toml"
+    study.write_text(
+        'case = "oring"\nmaterial = "neo-hooke"\ndensity = 1\nspeeds = 400\nstroke = "out"\n'
+        "error_estimate = false\n"
+        "[grid]\nsealed_pressure = [0.5, 1]\nmu = [0.5, 0.9]\n",
+        encoding="utf-8",
+    )
+    assert main(["sweep", str(study), "--out", str(place / "runs"), "--quiet"]) == 0
+    return place / "runs"
+
+
+def test_two_folders_side_by_side(runs: tuple[Path, Path], both: Path) -> None:
+    from openpyxl import load_workbook
+
+    text = both.read_text(encoding="utf-8")
+    assert len(text.encode()) < LARGEST
+    soft, hard = (json.loads((r / "run.json").read_text(encoding="utf-8"))["states"] for r in runs)
+    change = 100.0 * (hard[0]["h_star_um"] / soft[0]["h_star_um"] - 1.0)
+    assert "hard, difference in %" in text
+    assert f"<td>{change:.4g}</td>" in text
+    book = load_workbook(both.with_suffix(".xlsx"))
+    first = next(s for s in book.worksheets if s.title.startswith("Side by side"))
+    header = [cell.value for cell in first[2]]
+    assert header == ["U [mm/s]", "soft", "hard", "hard, difference in %"]
+    assert [cell.value for cell in first[3]] == pytest.approx(
+        [800.0, soft[0]["h_star_um"], hard[0]["h_star_um"], change]
+    )
+
+
+def test_a_sweep_has_a_pivot_table_and_its_best_and_worst_run(swept: Path) -> None:
+    from openpyxl import load_workbook
+
+    assert main(["report", str(swept), "--xlsx"]) == 0
+    text = (swept / "report.html").read_text(encoding="utf-8")
+    assert "over sealed pressure and mu</h1>" in text
+    book = load_workbook(swept / "report.xlsx")
+    pivot = [[c.value for c in row] for row in book["Largest friction N"].iter_rows()]
+    assert pivot[1] == [None, "mu = 0.5 MPa", "mu = 0.9 MPa"]
+    assert [row[0] for row in pivot[2:]] == ["sealed pressure = 0.5 MPa", "sealed pressure = 1 MPa"]
+    friction = {}
+    for number in range(1, 5):
+        content = json.loads((swept / f"runs/{number:05d}/run.json").read_text(encoding="utf-8"))
+        friction[number] = max(abs(state["rod_friction_N"]) for state in content["states"])
+    assert [v for row in pivot[2:] for v in row[1:]] == pytest.approx(list(friction.values()))
+    rows = {row[0].value: [c.value for c in row] for row in book["Best and worst"].iter_rows()}
+    best, worst = (choose(friction, key=friction.__getitem__) for choose in (min, max))
+    _, least, at, most, where = rows["largest friction [N]"]
+    assert (least, most) == pytest.approx((friction[best], friction[worst]))
+    assert f"(run {best})" in str(at)
+    assert f"(run {worst})" in str(where)
+    asked = [row[0].value for row in book["What was asked"].iter_rows()]
+    assert "speeds" in asked  # the same in all runs
+    assert not {"sealed_pressure", "mu"} & set(asked)
+    thin = rows["thinnest film [um]"]
+    assert float(str(thin[1])) > float(str(thin[3]))  # the thicker one is better

@@ -10,17 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import softehl
 from softehl.cases.harness import sweep
 from softehl.cases.harness.errors import BadInput
+from softehl.cases.paper import docs_tables
 from softehl.cases.paper import reproduce as computing
 from softehl.cases.paper.checks import observed_order
 from softehl.cases.paper.figure_spec import Scope
 from softehl.cases.paper.inverse_theory import film_of, largest_inlet_gradient
 from softehl.cases.paper.lookup import angle, ripple
 from softehl.cases.paper.reproduce import ITEMS, reproduce_items
-from softehl.cases.paper.states import Store, ask, merged, setup
+from softehl.cases.paper.states import NOT_REACHED, Store, ask, merged, setup
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.io import write_csv, write_json
@@ -262,3 +264,52 @@ def test_what_holds_no_tension_back_lets_the_pressure_fall(tmp_path: Path) -> No
     assert float(row["least_p_without_MPa"]) < -0.3
     assert abs(float(row["h_star_change_percent"])) < 0.1
     assert float(row["friction_change_percent"]) > 1.0
+
+
+TEMPLATE = (
+    "before\n<!-- table t: b, verdicts -->\nold\n<!-- end -->\n<!-- caption c -->\n<!-- end -->\n"
+)
+
+
+def test_a_profile_that_is_no_plain_result_is_dotted_or_absent(marked: Store) -> None:
+    product = ITEMS["fig10"].make(marked, Scope())
+    figure = Figure()
+    assert product.draw is not None
+    product.draw(figure)
+    lines = {str(line.get_label()): line.get_linestyle() for line in figure.axes[1].lines}
+    assert lines == {
+        "density 1": "-",
+        "density 2 (oscillating)": ":",
+        "density 4 (collapsed)": "None",
+        f"density 8 ({NOT_REACHED})": "None",
+    }
+    assert (
+        "oscillating: U +400 d 2; collapsed: U +400 d 4; not reached: U +400 d 8" in product.caption
+    )
+    verdicts = [row[-1] for row in product.tables["fig10_states"].rows]
+    assert verdicts == [*VERDICTS.values(), NOT_REACHED]
+    assert {row[0] for row in product.tables["fig10"].rows} == {"density 1", "density 2"}
+
+
+def test_a_point_that_is_no_plain_result_is_hollow_or_absent(marked: Store) -> None:
+    product = ITEMS["fig17"].make(marked, Scope())
+    figure = Figure()
+    assert product.draw is not None
+    product.draw(figure)
+    points = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
+    faces = {float(np.asarray(p.get_xdata())[0]): p.get_markerfacecolor() for p in points}
+    assert set(faces) == {1.0, 2.0}
+    assert faces[2.0] == "white" != faces[1.0]
+    assert [text.get_text() for text in figure.axes[0].texts] == ["o"]
+
+
+def test_the_page_takes_its_tables_from_files(tmp_path: Path) -> None:
+    write_csv(tmp_path / "t.csv", ("a", "b", "verdicts"), [[1.0, 0.123456, ".o"], [2.0, 3.0, "-"]])
+    (tmp_path / "c.txt").write_text("A caption.\n")
+    text = docs_tables.renewed(TEMPLATE, tmp_path)
+    assert "old" not in text
+    assert "| b | verdicts |\n|---|---|\n| 0.1235 | `.o` |\n| 3 | `-` |\n" in text
+    assert "\nA caption.\n" in text
+    assert docs_tables.renewed(text, tmp_path) == text
+    with pytest.raises(ValueError, match="no column 'z'; allowed: a, b, verdicts"):
+        docs_tables.renewed(TEMPLATE.replace("b,", "z,"), tmp_path)

@@ -416,7 +416,7 @@ PEAKS: dict[str, dict[str, Any]] = {
     "trapezoid": {"groove_width": 5.2},
     "u_cup": {"groove_width": 6.0, "sealed_pressure": 8.0},
 }
-QUICK = ("round", "rectangular", "d_ring")
+QUICK = ("round", "d_ring")
 
 
 @pytest.mark.parametrize(

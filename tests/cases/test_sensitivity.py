@@ -75,7 +75,8 @@ CASES = {
     ),
 }
 MEASURES = (*LENGTHS, *dict.fromkeys(key for name in SECTIONS for key in dimensions(name)))
-ALL = [pytest.param(n, marks=[pytest.mark.slow] * n.startswith("section")) for n in CASES]
+QUICK = ("out", "dg", "conserving", "thinning")
+ALL = [pytest.param(n, marks=[pytest.mark.slow] * (n not in QUICK)) for n in CASES]
 STEP = 5e-7
 """A tenth of what makes a point of the film cavitate: there the friction has a kink."""
 

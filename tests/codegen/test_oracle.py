@@ -57,8 +57,9 @@ CHOSEN = {
 """The cases that are compared in every run: as few as take both sides of every branch; the first
 case of any other family."""
 
+DEAR = ("mortar_23", "mortar_32", "mortar_33", "touch_side_8", "touch_side_9")
 EVERY = [
-    *ALL,
+    *(pytest.param(f, marks=[pytest.mark.slow] * (f in DEAR)) for f in ALL),
     *(pytest.param(f"{f}, everywhere", marks=pytest.mark.slow) for f in ALL),
 ]
 """Families with their chosen cases, and with all."""

@@ -22,7 +22,7 @@ from tests.codegen.random_models import UNKNOWNS, expressions
 
 FUZZ = settings(
     derandomize=True,
-    max_examples=60,
+    max_examples=30,
     database=None,
     deadline=None,
     phases=[Phase.generate],

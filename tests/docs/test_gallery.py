@@ -29,8 +29,9 @@ def read(entry: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> Reader:
 
 LONG = (
     *("contact", "cook", "enhanced", "fbar", "fit", "fracture", "jumps", "stick-slip", "swing"),
+    *("cahn-hilliard", "column", "finite-plasticity", "maxwell"),
 )
-"""Entries that take 3 s and more."""
+"""Entries that take a second and more."""
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def displacements(result: Result) -> dict[Any, dict[str, float]]:
     return {place: {n: result.at(place)[n] for n in ("u_x", "u_y")} for place in PLACES}
 
 
-@pytest.mark.parametrize("start", [(1.5, 0.5), (0.5, 1.5), (0.5, 0.5), (1.5, 1.5)])
+@pytest.mark.parametrize("start", [(1.5, 0.5), (0.5, 1.5)])
 def test_cook_from_half_off(start: tuple[float, float]) -> None:
     fit = cook(start[0] * MU, start[1] * K).fit(displacements(truth()[-1]), by=BY, steps=4)
     assert fit.values["rubber", "mu"] == pytest.approx(MU, rel=1e-8)

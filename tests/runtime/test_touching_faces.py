@@ -83,7 +83,7 @@ def test_a_uniform_pressure_passes_between_faces(upper: int, lower: int, kinds: 
     assert result.reaction("lower:bottom")["u_z"] == pytest.approx(force(result), rel=1e-10)
 
 
-@pytest.mark.parametrize(("upper", "lower", "kinds"), [*LINEAR[1:], *QUADRATIC])
+@pytest.mark.parametrize(("upper", "lower", "kinds"), [LINEAR[2], QUADRATIC[0]])
 def test_a_uniform_stress_passes_where_the_interface_is_inclined(
     upper: int, lower: int, kinds: Kinds
 ) -> None:
@@ -101,9 +101,7 @@ def test_a_uniform_stress_passes_where_the_interface_is_inclined(
 
 
 CURVED = [(("hex20", "tet10"), 0.02), (("tet10", "hex27"), 5.0)]
-MIXED: list[Any] = [
-    (kinds, f) for kinds in (("hex8", "tet4"), ("tet4", "hex8")) for f in (5.0, 0.02)
-]
+MIXED: list[Any] = [(("hex8", "tet4"), 0.02), (("tet4", "hex8"), 5.0)]
 
 
 @pytest.mark.parametrize(
@@ -173,6 +171,7 @@ def test_a_block_slides_at_the_coefficient_of_friction() -> None:
         assert abs(way @ shear) == pytest.approx(0.3 * force(result), rel=5e-3)
 
 
+@pytest.mark.slow
 def test_a_section_in_space_is_pressed_until_it_touches_itself() -> None:
     flat = gasket(1, 1)
     mesh = extruded(flat, 0.3)
