@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import array
-import fcntl
 import importlib
 import os
 import stat
 import sys
-import termios
 import time
 from functools import cache
 from types import TracebackType
@@ -122,6 +120,9 @@ def _everywhere(comm: Any) -> bool:
 
 def _await_reader(stream: TextIO) -> None:
     """Wait until the launcher has read the stream, a pipe: MPI_Abort drops what is unread."""
+    import fcntl  # late: not on Windows
+    import termios
+
     unread, end = array.array("i", [0]), time.monotonic() + _READ
     try:
         out = stream.fileno()

@@ -21,7 +21,6 @@ from softehl.cases.harness.case import AnyCase, Run
 from softehl.cases.harness.curve_folder import CurveFolder
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.file_content import Content, file_digest, write_content
-from softehl.cases.harness.folder_lock import FolderLock
 from softehl.cases.harness.observer import Outcome, StageRecord, State
 from softehl.cases.harness.resume import (
     Earlier,
@@ -31,6 +30,7 @@ from softehl.cases.harness.resume import (
     read_earlier,
 )
 from softehl.cases.harness.row import Record, Row
+from softehl.folder_lock import FolderLock
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, write_arrays, write_csv, write_json
 from softehl.runtime.kernels.shared_library import library_of
@@ -97,7 +97,7 @@ class RunRecord:
         self._began: float | None = None
         self._earlier = Earlier()
         self._existing = existing
-        self._lock = FolderLock(folder)
+        self._lock = FolderLock(folder, error=BadInput)
         self._size: dict[str, Any] = dict.fromkeys(_SIZE)
         self._logs: list[StageLog] = []
         self._stages: list[StageRecord] | None = None

@@ -21,7 +21,6 @@ import click
 
 from softehl.cases.harness.case import AnyCase, Run
 from softehl.cases.harness.errors import BadInput, one_line
-from softehl.cases.harness.folder_lock import FolderLock
 from softehl.cases.harness.parameters import Parameters, keys_of
 from softehl.cases.harness.process_pool import completed, processes
 from softehl.cases.harness.progress import Display, make_counter
@@ -36,6 +35,7 @@ from softehl.cases.harness.run_record import (
 )
 from softehl.cases.harness.runner import NOT_CONVERGED, compute, writing
 from softehl.cases.harness.study_file import Study
+from softehl.folder_lock import FolderLock
 from softehl.runtime.io import Cell, number_text, read_json, write_csv, write_json
 
 _LONGEST = 120
@@ -215,7 +215,7 @@ class SweepRecord:
         self.folder, self.study, self._existing = folder, study, existing
         self.curves: dict[int, Curve] = {}
         self.missing: list[Task] = []
-        self._lock = FolderLock(folder)
+        self._lock = FolderLock(folder, error=BadInput)
         self._previous_seconds, self._began, self._saved = 0.0, time.monotonic(), 0.0
         require_folder(folder)
         self._earlier: Mapping[str, Any] = {}

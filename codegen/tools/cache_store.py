@@ -29,11 +29,7 @@ from pathlib import Path
 from softehl.codegen.tools import cache_dir
 from softehl.codegen.tools.cache_dir import CacheError, require_own, root, writable
 from softehl.codegen.tools.model_text import digest_of
-
-try:
-    import fcntl
-except ImportError:  # not on Windows
-    fcntl = None  # type: ignore[assignment]
+from softehl.folder_lock import FolderInUseError, FolderLock
 
 Files = Mapping[str, str]
 _SCRATCH = ".part-"
@@ -161,25 +157,10 @@ def _existing(key: str, usable: Callable[[Path], bool]) -> Path | None:
 @contextmanager
 def _alone(lock: Path) -> Iterator[None]:
     """Wait, within reason, for another process that makes the same: it spares the work, no more."""
-    try:
-        file = lock.open("w")
-    except OSError:
+    with FolderLock(lock.parent, lock.name) as folder_lock:
+        with suppress(FolderInUseError, OSError):  # also on a file system without locks
+            folder_lock.take(_PATIENCE)
         yield
-        return
-    with file:
-        end = time.monotonic() + _PATIENCE
-        while fcntl is not None and time.monotonic() < end:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                time.sleep(0.05)
-            except OSError:  # a file system without locks
-                break
-        try:
-            yield
-        finally:
-            lock.unlink(missing_ok=True)
 
 
 def _synchronise(folder: Path) -> None:

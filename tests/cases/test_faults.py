@@ -18,13 +18,13 @@ import pytest
 import softehl
 from softehl.cases import oring
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.folder_lock import FolderLock
 from softehl.cases.harness.report.page import read_finished
 from softehl.cases.harness.run_record import table_digests
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import Observer
 from softehl.cases.shipped import SHIPPED
+from softehl.folder_lock import FolderLock
 from tests.cases.test_cli import FAST, Fake, film_state, solve
 
 FOLDER = ("run", "oring", *FAST, "--out", "a")
@@ -203,7 +203,7 @@ def test_a_folder_in_use_is_refused_and_a_killed_owner_is_not(
         [
             *(sys.executable, "-c"),
             "import sys, time; from pathlib import Path\n"
-            "from softehl.cases.harness.folder_lock import FolderLock\n"
+            "from softehl.folder_lock import FolderLock\n"
             "lock = FolderLock(Path('a')); lock.take(); print('taken', flush=True)\n"
             "time.sleep(60)",
         ],
@@ -226,8 +226,9 @@ def test_a_lock_is_for_one(tmp_path: Path) -> None:
     with FolderLock(tmp_path) as first:
         first.take()
         first.take()
-        with pytest.raises(BadInput, match="in use"):
-            FolderLock(tmp_path).take()
+        with pytest.raises(BadInput, match=f"in use .* \\(process {os.getpid()} on "):
+            FolderLock(tmp_path, error=BadInput).take()
+    assert not list(tmp_path.iterdir())
     second = FolderLock(tmp_path)
     second.take()
     second.release()
