@@ -260,7 +260,9 @@ class EquationsOfMotion:
             lambda z: free.gather(self.M @ free.expand(z)),
             lambda r: inverse * r,
             np.where(diagonal > 0.0, -free.gather(forces.total + forces.constraints), 0.0),
-            *(_EXACT, _MOST, self.comm.dot),
+            tolerance=_EXACT,
+            max_iterations=_MOST,
+            dot=self.comm.dot,
         )
         if not solution.converged:
             raise StudyError("the mass is not positive: no accelerations at the start are found")

@@ -145,9 +145,15 @@ class ExplicitMarch:
         solution = Solution(state.x, Status.CONVERGED, f"{steps} steps", (), 0, 0)
         distributed = self.body.comm.distribute(end)
         return Motion(
-            *(self.body.static_system, distributed, Point(state.t, solution), state.histories),
-            v=state.v, a=state.a, energy=self._energies(end, ledger), stable_step=stable,
-        )  # fmt: skip
+            self.body.static_system,
+            distributed,
+            Point(state.t, solution),
+            state.histories,
+            v=state.v,
+            a=state.a,
+            energy=self._energies(end, ledger),
+            stable_step=stable,
+        )
 
 
 def _require_lumped_masses(body: EquationsOfMotion, problem: Problem) -> None:

@@ -167,8 +167,11 @@ class EnergyRoles:
                 past = page is not None and page.previous
                 roles[block.name] = "energy" if has_energy(kernel) and not past else "work"
         none = np.empty(0, dtype=np.int64)
-        numbers = [np.unique(np.concatenate([none, *parts])) for parts in (multipliers, bound)]
-        return cls(roles, *numbers)
+        return cls(
+            of=roles,
+            multipliers=np.unique(np.concatenate([none, *multipliers])),
+            bound=np.unique(np.concatenate([none, *bound])),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -108,10 +108,16 @@ def _contact_and_sides(
     for kind, faces in side_faces.items():
         label = name if len(side_faces) == 1 else f"{name}:{kind}"
         blocks[label] = _block(mesh, name, label, (kind, faces), names, float(axisymmetric))
-    friction, stiffness, depth = (numbers[k] for k in ("friction", "stiffness", "depth"))
-    faces_of = (*other_faces.items(),)
     contact = ContactRequest(
-        name, (*blocks,), faces_of, names, friction or 0.0, axisymmetric, alone, stiffness, depth
+        name=name,
+        labels=(*blocks,),
+        other_faces=(*other_faces.items(),),
+        names=names,
+        friction=numbers["friction"] or 0.0,
+        axisymmetric=axisymmetric,
+        alone=alone,
+        stiffness=numbers["stiffness"],
+        depth=numbers["depth"],
     )
     return contact, blocks
 

@@ -43,29 +43,44 @@ def contact_of(
         block = definition.blocks[label]
         x = mesh.points[block.nodes]
         reach = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)  # of the order of a face
-        body = mesh.points, mesh.boundary, block.nodes
-        depth = inner_radii(*body) if request.alone else thickness(*body)
+        measure = inner_radii if request.alone else thickness
+        depth = measure(mesh.points, mesh.boundary, block.nodes)
         depth = np.minimum(depth, float(np.ptp(mesh.points, axis=0).max()))
         if request.depth is not None:
             depth = np.full(len(reach), request.depth)
         sides.append(ContactSide(block.kind, block.nodes, np.ones(len(reach)), depth, reach))
     kinds = [(s.kind, other) for s in sides for other, _ in request.other_faces]
     unknowns = [request.unknown(m) for m in MULTIPLIERS[mesh.dimension]]
-    arguments = (
-        request.name,
-        mesh.points,
-        np.stack([numbering.nodal[n] for n in request.names], axis=1),
-        np.stack([numbering.nodal[n] for n in unknowns], axis=1),
-        tuple(sides),
-        request.other_faces,
-    )
+    displacements = np.stack([numbering.nodal[n] for n in request.names], axis=1)
+    multipliers = np.stack([numbering.nodal[n] for n in unknowns], axis=1)
     if mesh.dimension == 3:
         law = load_kernel("touch")
         pairs = {(a, b): MortarPairKernel(law, CELLS[a], CELLS[b]) for a, b in kinds}
-        return FaceContact(*arguments, pairs, request.friction, request.alone)
+        return FaceContact(
+            name=request.name,
+            points=mesh.points,
+            displacements=displacements,
+            multipliers=multipliers,
+            sides=tuple(sides),
+            others=request.other_faces,
+            kernels=pairs,
+            friction=request.friction,
+            alone=request.alone,
+        )
     nodes = {kind: len(CELLS[kind].nodes) for pair in kinds for kind in pair}
     kernels = {(a, b): load_kernel(f"mortar_{nodes[a]}{nodes[b]}") for a, b in kinds}
-    return Contact(*arguments, kernels, request.friction, request.axisymmetric, request.alone)
+    return Contact(
+        name=request.name,
+        points=mesh.points,
+        displacements=displacements,
+        multipliers=multipliers,
+        sides=tuple(sides),
+        others=request.other_faces,
+        kernels=kernels,
+        friction=request.friction,
+        ring=request.axisymmetric,
+        alone=request.alone,
+    )
 
 
 def _require_displacements(definition: ProblemDefinition, request: ContactRequest) -> None:

@@ -100,7 +100,7 @@ def _falls_along(problem: Any, x: Array, factors: tuple[Any, Any] | None) -> str
     """Along how many directions the energy falls, in words; empty where along none."""
     count = None
     if factors is not None:
-        count = negative_by_factors(problem, *factors)
+        count = negative_by_factors(problem, K=factors[0], factors=factors[1])
         iterative = getattr(factors[1], "indefinite", None)
         falls = iterative() if count is None and iterative is not None else None
         if falls is not None:  # other factors would be too large

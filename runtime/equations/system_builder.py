@@ -162,11 +162,13 @@ class _BlockBuilder:
         width = block.nodes.shape[1] * self.mesh.dimension if block.kernel.coordinates else 0
         coordinates = self.mesh.points[block.nodes].reshape(n, width) if width else np.empty((n, 0))
         element_data = [block.data[d] for d in block.kernel.data if d in block.data]
-        data = (
-            np.stack(element_data, axis=1) if element_data else None
-        )  # what else there is comes with steps
+        # what else there is comes with steps
+        data = np.stack(element_data, axis=1) if element_data else None
         return ElementBlock(
-            *(block.name, block.kernel, coordinates, self.numbering.dofs[block.name]),
+            block.name,
+            block.kernel,
+            coordinates,
+            self.numbering.dofs[block.name],
             data=data,
             rule=block.options.rule,
             constant=block.options.constant,

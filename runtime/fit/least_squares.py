@@ -118,11 +118,11 @@ class SearchVariables:
         positive = np.concatenate(stiff) & (start > 0.0) & ((lower >= 0.0) | (lower == -np.inf))
         sizes = np.where(start == 0.0, 1.0, np.abs(start))
         with np.errstate(divide="ignore", invalid="ignore"):
-            variables = [
+            first, low, high = (
                 np.where(positive, np.log(np.maximum(v, 0.0) / sizes), v / sizes)
                 for v in (start, lower, upper)
-            ]
-        return cls(sizes, positive, *variables)
+            )
+        return cls(sizes=sizes, positive=positive, start=first, lower=low, upper=high)
 
     def values(self, y: Array) -> Array:
         """Inputs (k,) of variables (k,)."""
