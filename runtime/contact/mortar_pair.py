@@ -168,7 +168,7 @@ class _PairGeometry:
             xi = self._project(self.pair.one, self.side_nodes, z, normal)
             slope = self._gradient(self.pair.one, self.side_nodes, xi)
             first, second = ((slope[0][:, :, d], slope[1][:, :, d]) for d in (0, 1))
-            area_ratio = _over(self._area(*xi), _triple(first, second, normal))
+            area_ratio = _over(self._area(xi), _triple(first, second, normal))
             yield (
                 _product(_times(weight, area), area_ratio),
                 self._point(
@@ -230,10 +230,10 @@ class _PairGeometry:
             change[:, c][:, :, [3 * i + c for i in numbers]] += G.transpose(0, 2, 1)
         return gradient, change
 
-    def _area(self, xi: Array, dxi: Array) -> _Varied:
+    def _area(self, xi: _Varied) -> _Varied:
         """Area at rest per parent area."""
         k = len(self.pair.one.nodes)
-        G, dG = _gradients(self.pair.one, (xi, dxi))
+        G, dG = _gradients(self.pair.one, xi)
         X = self.X[:, :k]
         slope = np.einsum("nkd,nkc->ncd", G, X)
         change = np.einsum("nkdm,nkc->ncdm", dG, X)

@@ -216,7 +216,7 @@ def from_names(unknowns: Sequence[str], nodes: int) -> tuple[Slot, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Elements:
+class ElementUnknowns:
     """Elements of one block: nodes (n, k), what their unknowns are, which of them are shared.
 
     along: names of fields that are interpolated along the elements -> numbers (n, m) of their
@@ -251,7 +251,7 @@ class Numbering:
     def of(
         cls,
         points: int,
-        blocks: Sequence[Elements],
+        blocks: Sequence[ElementUnknowns],
         fields: Mapping[str, Sequence[str]] | None = None,
     ) -> Numbering:
         """Number the unknowns of blocks of elements on so many nodes.
@@ -307,7 +307,7 @@ def _members(
     return {name: names for name, names in (members | alone).items() if names}
 
 
-def _present(points: int, blocks: Sequence[Elements]) -> dict[str, Flags]:
+def _present(points: int, blocks: Sequence[ElementUnknowns]) -> dict[str, Flags]:
     """Unknowns at nodes: name -> (points,) where there is one."""
     masks: dict[str, Flags] = {}
     for block in blocks:
@@ -318,7 +318,7 @@ def _present(points: int, blocks: Sequence[Elements]) -> dict[str, Flags]:
     return masks
 
 
-def _others(blocks: Sequence[Elements]) -> dict[str, int]:
+def _others(blocks: Sequence[ElementUnknowns]) -> dict[str, int]:
     """Numbers of the unknowns of elements, and of those along elements, by name."""
     element_names = dict.fromkeys(name for block in blocks for name in block.own)
     offsets = {name: _first(name, blocks, None) for name in element_names}
@@ -330,7 +330,7 @@ def _others(blocks: Sequence[Elements]) -> dict[str, int]:
     return offsets
 
 
-def _first(name: str, blocks: Sequence[Elements], until: Elements | None) -> int:
+def _first(name: str, blocks: Sequence[ElementUnknowns], until: ElementUnknowns | None) -> int:
     """Number of the unknowns of a name without nodes in the blocks before one of them.
 
     The one that blocks share comes first.
@@ -345,8 +345,8 @@ def _first(name: str, blocks: Sequence[Elements], until: Elements | None) -> int
 
 
 def _dofs(
-    block: Elements,
-    blocks: Sequence[Elements],
+    block: ElementUnknowns,
+    blocks: Sequence[ElementUnknowns],
     nodal: Mapping[str, Integers],
     rows: Mapping[str, Integers],
 ) -> Integers:

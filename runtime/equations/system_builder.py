@@ -17,7 +17,7 @@ from softehl.runtime.definition.problem_definition import (
     StudyError,
 )
 from softehl.runtime.discretisation.assembly import Assembler
-from softehl.runtime.discretisation.dofmap import Elements, Numbering
+from softehl.runtime.discretisation.dofmap import ElementUnknowns, Numbering
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.equations.contact_setup import contact_of, with_contacts
@@ -38,7 +38,9 @@ def build_system(
         raise StudyError("there are no elements: add a page, study.add('body', 'solid.py')")
     mesh, pages = definition.mesh, definition.blocks.values()
     _warn_of_holes(definition)
-    elements = [Elements(b.name, b.nodes, b.slots, b.shared, b.options.dof_tables) for b in pages]
+    elements = [
+        ElementUnknowns(b.name, b.nodes, b.slots, b.shared, b.options.dof_tables) for b in pages
+    ]
     try:
         numbering = Numbering.of(len(mesh.points), elements, fields)
     except ValueError as error:

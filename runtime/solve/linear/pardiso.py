@@ -187,7 +187,7 @@ class _Lent:
 
 @dataclass(frozen=True, eq=False)
 class PartialFactors:
-    """Factors of all but the boundary unknowns; see `solve.linear.linear_solver.Condensed`."""
+    """Factors of all but the boundary unknowns; see `SchurComplement`."""
 
     handle: _Handle
     boundary: Integers
@@ -256,8 +256,15 @@ class Pardiso:
         handle.factorise(K, np.empty(0))
         lent = _Lent(handle)
         weakref.finalize(lent, self.idle.give_back, handle).atexit = False
-        settings = self.refinement, self.accuracy, self.settled
-        return Factorisation(K, lent, row_sums, *settings, units)
+        return Factorisation(
+            matrix=K,
+            factors=lent,
+            row_sums=row_sums,
+            refinement=self.refinement,
+            accuracy=self.accuracy,
+            settled=self.settled,
+            units=units,
+        )
 
     def condense(self, K: SparseMatrix, boundary: Integers) -> PartialFactors:
         """Factors of K, (n, n), without those unknowns, (m,), and their Schur complement."""

@@ -53,8 +53,14 @@ class SuperLU:
     def factorise(self, K: SparseMatrix) -> Factorisation:
         """Factors of K, square, shape (n, n), csc; raises SingularMatrix."""
         K, row_sums, units = equilibrate(K)
-        settings = self.refinement, self.accuracy
-        return Factorisation(K, self._ordered(K), row_sums, *settings, units=units)
+        return Factorisation(
+            matrix=K,
+            factors=self._ordered(K),
+            row_sums=row_sums,
+            refinement=self.refinement,
+            accuracy=self.accuracy,
+            units=units,
+        )
 
     def condense(self, K: SparseMatrix, boundary: Integers) -> SchurComplement:
         """See `Condenser`: by one factorisation unless pivots or memory forbid it."""
