@@ -1,4 +1,4 @@
-"""Names that were not found, functions of other arguments: hints at what was probably meant."""
+"""Suggestions for messages: similar names, lists of names, signatures of functions."""
 
 from __future__ import annotations
 

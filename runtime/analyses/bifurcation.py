@@ -167,6 +167,6 @@ def displacements(system: System, x: Array) -> Array:
 
 
 def require_detect(detect: object) -> None:
-    """Raise StudyError for what cannot be looked for."""
+    """Raise StudyError for anything but "bifurcation"."""
     if detect not in (None, "bifurcation"):
         raise StudyError(f'detect = {detect!r}: allowed are "bifurcation" and None')

@@ -1,4 +1,4 @@
-"""The equations of a body in motion: those of a study with its inertia."""
+"""Equations of motion of a study: its discrete equations with inertia."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class EquationsOfMotion:
     def of(
         cls, system: System, mass: Masses | None, integrator: SecondOrderIntegrator | None, at: Step
     ) -> EquationsOfMotion:
-        """Raises StudyError where there is no mass, or where a rate belongs to none."""
+        """Return the equations at a step.  Raises StudyError without mass."""
         problem, blocks = system.local_problem(at), mass_blocks(system, mass)
         comm, M = system.comm, mass_matrix(system, problem, at.old, mass)
         heavy = comm.sum_shared(M.diagonal()) > 0.0
@@ -251,7 +251,7 @@ class EquationsOfMotion:
         )
 
     def initial_accelerations(self, problem: Problem, x: Array) -> Array:
-        """Accelerations (n,) at the start x: M a = -f on what is free.  Raises StudyError."""
+        """Initial accelerations (n,): M a = -f on free unknowns.  Raises StudyError."""
         forces = Forces.of(problem, x, self.roles)
         free = self.comm.constraint_map(problem)
         diagonal = free.gather(self.M.diagonal())

@@ -269,7 +269,7 @@ class PeriodicProblem:
         return np.asarray(self.basis.T @ r), csc_array(self.basis.T @ K @ self.basis)
 
     def norm(self, r: Array) -> float:
-        """Never asked: residuals are measured by their forces."""
+        """Not used: residuals are measured relative to their forces."""
         raise NotImplementedError
 
     def step_limit(self, x: Array, dx: Array) -> float:

@@ -1,4 +1,4 @@
-"""A state of a body in motion, and its energies."""
+"""Motion: a result with velocities and accelerations, and the balance of its energies."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ class Forces:
 
     @classmethod
     def of(cls, problem: Problem, x: Array, roles: EnergyRoles) -> Forces:
-        """Without inertia given by densities; ties and contacts without their own equations."""
+        """Return the forces without inertia; ties and contacts without their own equations."""
         problem = problem.at(x)
         size = problem.assembler.size
         parts = {name: np.zeros(size) for name in ("load", "energy", "work", "tie", "contact")}

@@ -1,4 +1,4 @@
-"""Reading what a script gives: numbers, functions, data of elements, nodes; errors name it."""
+"""Checks of arguments: numbers, functions, data of elements, nodes; errors name the argument."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def datum(block: str, name: str, value: Datum, centres: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class PointFunction:
-    """A function of places (n, dim) and t as it was given, whose values are looked at."""
+    """Function of coordinates (n, dim) and t, whose values are checked."""
 
     context: str
     function: Callable[[Array, float], Array | float]
@@ -98,7 +98,7 @@ class PointFunction:
 
 @dataclass(frozen=True, eq=False)
 class TimeFunction:
-    """A function of t as it was given, whose values are looked at."""
+    """Function of t, whose values are checked."""
 
     context: str
     function: Callable[[float], float]

@@ -1,4 +1,4 @@
-"""A page on elements of a mesh: which elements, what its arguments are."""
+"""Blocks of elements of a page: their nodes, unknowns, data and parameters."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _faces(mesh: Mesh, on: str | Predicate, kernel: Kernel) -> Mapping[str, Inte
 
 
 def kinds_of(mesh: Mesh, on: On, cells: str | None) -> tuple[str, ...]:
-    """The kinds of cells or faces that are meant; none where elements are given by their nodes."""
+    """Kinds of the selected cells or faces; none for elements that are given by their nodes."""
     if isinstance(on, np.ndarray):
         return ()
     if on is None:
@@ -290,7 +290,7 @@ def form_of(
 
 
 def elements_on(name: str, on: Any) -> On:
-    """A side, or node numbers as an array, which may be given as lists.  Raises StudyError."""
+    """Return a side, or node numbers as an array.  Raises StudyError."""
     side_or_nodes: On = on
     if isinstance(on, np.ma.MaskedArray):
         raise StudyError(f"{name!r}: on is a masked array, whose mask says nothing here")

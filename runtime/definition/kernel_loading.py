@@ -47,7 +47,7 @@ class KernelOrigin:
         )
 
     def differentiated(self, kernel: Kernel) -> Callable[[], Kernel] | None:
-        """Maker of the kernel of derivatives of a page, which is derived when it is asked for."""
+        """Return the maker of the kernel of derivatives of a page, which derives it when called."""
         if isinstance(self.source, Kernel) or is_folder(self.source):
             return None
         if "pseudo_load" in kernel.tasks and not kernel.point_data:
@@ -107,7 +107,7 @@ def is_folder(source: object) -> bool:
 
 
 def require_page(source: object) -> None:
-    """Raise StudyError for what cannot be loaded."""
+    """Raise StudyError for a source that is no page."""
     if isinstance(source, str | Path) or hasattr(source, "at_point"):
         return
     if callable(source) or hasattr(source, "finish") or not hasattr(source, "unknowns"):

@@ -1,4 +1,4 @@
-"""The records of a boundary-value problem as it was written down."""
+"""Definition of a boundary-value problem: blocks, prescribed values, loads, initial values."""
 
 from __future__ import annotations
 

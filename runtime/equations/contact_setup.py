@@ -1,4 +1,4 @@
-"""Contacts of a system: from what was written down to their search and their stiffness."""
+"""Contacts of a system: their search, elements and stiffness, from their definition."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mass of a study: densities that are given by block, and accelerations that pages name."""
+"""Mass matrix of a study: densities by block, and accelerations in pages."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def mass_blocks(system: System, densities: Masses | None) -> list[ElementBlock]:
 
 
 def _base(block: Block) -> str:
-    """The name that was given to a page on one or several kinds of cells."""
+    """Name of a page in the study, without the kind of cells."""
     return block.name.removesuffix(f":{block.kernel.cell}") if block.kernel.cell else block.name
 
 

@@ -316,7 +316,7 @@ class System:
                 )
 
     def _prescribed(self, step: Step) -> tuple[Integers, Array]:
-        """Unknowns and values, each once; one that is given two values is refused."""
+        """Prescribed unknowns and values.  Raises StudyError for two values of one unknown."""
         prescribed = np.full(self.size, np.nan)
         by = np.full(self.size, -1)
         for k, condition in enumerate(self.conditions):

@@ -1,4 +1,4 @@
-"""From what was written down to build_system: numbering, blocks of elements, the system."""
+"""System of a definition: numbering of unknowns, blocks of elements, contacts."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ class Measurements:
 
     @classmethod
     def read(cls, measured: Measured, times: Array) -> Measurements:
-        """As they were given; a list has a number for each of the times.  Raises StudyError."""
+        """Return measurements; a list has a number for each of the times.  Raises StudyError."""
         entries: list[tuple[Quantity, float, float]] = []
         if not isinstance(measured, Mapping) or not measured:
             raise StudyError('measured: a mapping is needed, {(48, 60): {"u_y": 12.4}}')

@@ -1,4 +1,4 @@
-"""A study solved for values of its inputs, and quantities of it as functions of them."""
+"""Objectives: quantities of a study as functions of its inputs, with their gradients."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from softehl.runtime.sensitivity.tape import Tape, blocks_with_history, time_cou
 
 @dataclass(eq=False)
 class _AdjointState:
-    """Derivatives of the quantity by what a step leaves behind.
+    """Derivatives of the quantity by the state after a step.
 
     states: by the unknowns after it, and after the step before it, (n,) each. histories: by the
     point data after it.
@@ -51,7 +51,7 @@ def _step(
     *,
     first: bool,
 ) -> _AdjointState:
-    """Go one step back; what the inputs do in it is added to what was found.
+    """Go one step back, and add the derivatives by the inputs in it to the gradients.
 
     weights: (n,) of the forces that make reactions, in the quantity.
     """
@@ -84,7 +84,7 @@ def _step(
 def _previous_step(
     step: LinearisedStep, back: _AdjointState, element_gradients: dict[str, _ElementGradient]
 ) -> _AdjointState:
-    """Derivatives by what the step before leaves behind."""
+    """Derivatives of the quantity by the state after the previous step."""
     earlier = [back.states[1], np.zeros(len(step.tape.x))]
     for c in time_couplings(step.tape):
         gradient = element_gradients[c.block].by(c.column)

@@ -1,4 +1,4 @@
-"""Reading by what results are differentiated: {"rubber": ["mu", "K"], "load:right": ["u_y"]}."""
+"""Parsing of inputs of derivatives: {"rubber": ["mu", "K"], "load:right": ["u_y"]}."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def _value_of(force: Load) -> object:
 
 
 def _key_of(force: Load) -> str:
-    """As a load is asked for: "load:right"."""
+    """Key of a load: "load:right"."""
     return f"{force.what}:{force.where}"
 
 

@@ -44,7 +44,7 @@ class InputColumn:
         rows[mask, self.column] += self.factor[mask] * seed[self.target[mask]]
 
     def pull(self, gradient: Array, slopes: Array) -> None:
-        """Add to the gradient what the slopes (n,) by the argument make of it."""
+        """Add the derivatives (n,) by the argument to the gradient."""
         mask = self.target >= 0
         np.add.at(gradient, self.target[mask], self.factor[mask] * slopes[mask])
 
@@ -76,11 +76,11 @@ _WIDE = 1e-3  # of the size of the mesh: step of a difference of order 6 of func
 
 
 class Input(Protocol):
-    """Something that a study is given: a number or an array."""
+    """Input of a study: a number or an array."""
 
     @property
     def key(self) -> Key:
-        """The names by which it was asked for."""
+        """Block, load or support, and a name of it."""
         ...
 
     @property

@@ -1,4 +1,4 @@
-"""Derivatives of what results say, directly or by adjoints, whichever takes fewer steps."""
+"""Derivatives of quantities of results: direct or adjoint, whichever takes fewer solutions."""
 
 from __future__ import annotations
 

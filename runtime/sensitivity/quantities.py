@@ -125,7 +125,7 @@ def quantity(
     at: tuple[float, ...] | None,
     reaction: str | None,
 ) -> Quantity:
-    """A quantity as it was asked for.  Raises StudyError."""
+    """Return the quantity of a request.  Raises StudyError."""
     if callable(what):
         return UserQuantity(what)
     if (at is None) == (reaction is None):

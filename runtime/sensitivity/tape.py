@@ -1,4 +1,4 @@
-"""A converged step of a path with the steps that led to it; derivatives are taken of it."""
+"""Tape of a path: its converged steps, values that pass between them, for derivatives."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def depends_on_previous(system: System) -> bool:
 
 
 def continued_tape(system: System, start: Tape | None) -> Tape | None:
-    """The path that goes on from a start: None where that is of another study."""
+    """Tape of a start that a path continues; None if it is of another study."""
     if start is None or start.system.definition is not system.definition:
         return None
     return start if start.system.definition_size == system.definition_size else None
