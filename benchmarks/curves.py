@@ -40,7 +40,7 @@ PARTS = ("contact", "coarser films", "films", "files", "pictures", "else")
 def watched(clock: Clock) -> Iterator[None]:
     """The parts of all runs within it."""
     from softehl.cases.harness.run_record import RunRecord
-    from softehl.cases.harness.runner import Reporter
+    from softehl.cases.harness.runner import RecordingObserver
     from softehl.cases.oring import ORingCase
     from softehl.cases.seal.solve.adaptation import Adaptation
     from softehl.cases.seal.solve.contact_meshes import ContactMeshes
@@ -50,8 +50,8 @@ def watched(clock: Clock) -> Iterator[None]:
         (ContactMeshes, "contact", lambda *_: "contact"),
         (DryContact, "adapted", lambda *_: "films"),
         (Adaptation, "_coarser", lambda *_: "coarser films"),
-        (Reporter, "state", lambda *_: "files"),
-        (Reporter, "files", lambda *_: "files"),
+        (RecordingObserver, "state", lambda *_: "files"),
+        (RecordingObserver, "files", lambda *_: "files"),
         (RunRecord, "begin", lambda *_: "files"),
         (RunRecord, "save", lambda *_: "files"),
         (ORingCase, "draw", lambda *_: "pictures"),

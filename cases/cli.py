@@ -363,7 +363,7 @@ def design(
     """Find the value of a key."""
     from softehl.cases.harness.case_file import read_case
     from softehl.cases.harness.progress import make_display
-    from softehl.cases.harness.runner import Teller
+    from softehl.cases.harness.runner import DisplayObserver
     from softehl.cases.seal.gland.parameters import Seal
     from softehl.cases.seal.sensitivity.design import design_case, design_lines
     from softehl.cases.seal.states.observer_adapter import ObserverAdapter
@@ -377,7 +377,7 @@ def design(
             raise BadInput(f"--report {str(page)!r}: there is no folder {str(page.parent)!r}")
     with make_display(read.case.foreword(read.parameters), quiet=False) as display:
         found = design_case(
-            read.parameters, " ".join(target), key, ObserverAdapter(Teller(display))
+            read.parameters, " ".join(target), key, ObserverAdapter(DisplayObserver(display))
         )
     for line in design_lines(found):
         click.echo(line)

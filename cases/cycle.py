@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from scipy.integrate import trapezoid
 
 from softehl.cases.harness.case import Alarm, Case
-from softehl.cases.harness.observer import Observer, Outcome, State
+from softehl.cases.harness.observer import RunObserver, RunOutcome, State
 from softehl.cases.harness.parameters import key
 from softehl.cases.harness.pictures import KINDS, draw_columns, save
 from softehl.cases.harness.report.part import FinishedRun, Part
@@ -313,7 +313,7 @@ class CycleCase(Case[Cycle, CycleRow]):
         """See :class:`Case`."""
         return f"{piece.cycles} cycles"
 
-    def solve(self, parameters: Cycle, observer: Observer, shared: Path | None) -> Outcome:
+    def solve(self, parameters: Cycle, observer: RunObserver, shared: Path | None) -> RunOutcome:
         """See :class:`Case`."""
         from softehl.cases.seal.cycle.cycle_driver import run_cycles
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from softehl.cases.harness.case import Case
-from softehl.cases.harness.observer import Observer, Outcome
+from softehl.cases.harness.observer import RunObserver, RunOutcome
 from softehl.cases.harness.pictures import KINDS
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Record
@@ -47,7 +47,7 @@ class ORingCase(Case[Seal, FilmRow]):
     shared = "contacts"
     left_out = LEFT_OUT
 
-    def solve(self, parameters: Seal, observer: Observer, shared: Path | None) -> Outcome:
+    def solve(self, parameters: Seal, observer: RunObserver, shared: Path | None) -> RunOutcome:
         """See :class:`Case`; runs of one section share their contact states."""
         return run_oring(parameters, ObserverAdapter(observer), shared)
 

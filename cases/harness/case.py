@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from softehl.cases.harness.errors import BadInput, one_line
-from softehl.cases.harness.observer import Observer, Outcome
+from softehl.cases.harness.observer import RunObserver, RunOutcome
 from softehl.cases.harness.parameters import Parameters
 from softehl.cases.harness.row import Record, Row
 
@@ -57,7 +57,7 @@ class Case(Generic[P, R]):
         """Name by which the case is found again: of one that ships, else its source."""
         return self.source or self.name
 
-    def solve(self, parameters: P, observer: Observer, shared: Path | None) -> Outcome:
+    def solve(self, parameters: P, observer: RunObserver, shared: Path | None) -> RunOutcome:
         """Compute all rows that are asked for; failure is in the outcome's status.
 
         shared: folder of what runs leave for each other, None for none.  Imports what is heavy when
@@ -188,7 +188,7 @@ class Case(Generic[P, R]):
 
 
 AnyCase = Case[Any, Any]
-Solve = Callable[[Any, Observer], Outcome]
+Solve = Callable[[Any, RunObserver], RunOutcome]
 
 
 def load_case(module: str) -> AnyCase:
@@ -249,6 +249,6 @@ class Run:
     set_keys: frozenset[str] = frozenset()
     pictures: tuple[str, ...] = ("png",)
 
-    def solve(self, parameters: Any, observer: Observer) -> Outcome:
+    def solve(self, parameters: Any, observer: RunObserver) -> RunOutcome:
         """Run the case with these parameters."""
         return self.case.solve(parameters, observer, self.shared)

@@ -1,7 +1,7 @@
 """Messages of a case while it runs, and the outcome that it returns at the end.
 
-A case computes; it neither prints nor writes.  Everything that leaves it goes through an
-:class:`Observer`, at the moment it exists, so that a run that is killed keeps what it had reached.
+A case computes; it neither prints nor writes.  Every result leaves it through a
+:class:`RunObserver`, at the moment it exists, so that a run that is killed keeps what it reached.
 """
 
 from collections.abc import Mapping, Sequence
@@ -47,7 +47,7 @@ class StageRecord:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """States that a run reached; `status` and `message` say why it is not more, if it is not.
 
     states: as the observer was told them.  unknowns: their numbers, "total"
@@ -72,7 +72,7 @@ class Outcome:
         return self.status is Status.CONVERGED
 
 
-class Step(TypedDict):
+class StepReport(TypedDict):
     """A step of a path that has converged, as observers are told of it.
 
     label: name of the path parameter as it is shown. parameter: its value. residuals: norms of
@@ -86,14 +86,14 @@ class Step(TypedDict):
     fraction: float | None
 
 
-class Observer(Protocol):
+class RunObserver(Protocol):
     """The listener a case reports to.  Calls come in order, from one thread."""
 
     def stage(self, name: str, *, title: str, where: Mapping[str, Any]) -> None:
         """A stage begins.  title: what the user sees.  where: see :class:`StageRecord`."""
         return None
 
-    def step(self, **step: Unpack[Step]) -> None:
+    def step(self, **step: Unpack[StepReport]) -> None:
         """A step of the path converged."""
         return None
 

@@ -21,7 +21,7 @@ from typing import Any, TypeVar, Unpack
 
 from softehl.cases.harness.case import Solve
 from softehl.cases.harness.file_content import Content
-from softehl.cases.harness.observer import Observer, Outcome, State, Step
+from softehl.cases.harness.observer import RunObserver, RunOutcome, State, StepReport
 from softehl.runtime.solve.solution import Status
 
 T = TypeVar("T")
@@ -89,10 +89,10 @@ class _Worker:
     sender: our copy of the other side's end, until the first call shows that it has its own.
     """
 
-    observer: Observer
+    observer: RunObserver
     receiver: "Connection[Any, Any]"
     sender: "Connection[Any, Any]"
-    future: Future[Outcome]
+    future: Future[RunOutcome]
 
     def listen(self) -> None:
         """Make the next call."""
@@ -102,8 +102,8 @@ class _Worker:
 
 
 def solve_side_by_side(
-    solve: Solve, pieces: Sequence[Any], observers: Sequence[Observer]
-) -> list[Outcome]:
+    solve: Solve, pieces: Sequence[Any], observers: Sequence[RunObserver]
+) -> list[RunOutcome]:
     """Run each parameter set in its own process; the outcomes in the order of `pieces`.
 
     The observers are called in this process.  solve must cross by pickle.  A process that the
@@ -123,11 +123,11 @@ def solve_side_by_side(
         return _collect(workers)
 
 
-def _outcome(worker: _Worker) -> Outcome:
+def _outcome(worker: _Worker) -> RunOutcome:
     try:
         return worker.future.result()
     except BrokenProcessPool:
-        return Outcome(
+        return RunOutcome(
             states=(),
             status=Status.KILLED,
             message="its process was ended from outside (killed, or out of memory)",
@@ -136,7 +136,7 @@ def _outcome(worker: _Worker) -> Outcome:
         )
 
 
-def _collect(workers: Sequence[_Worker]) -> list[Outcome]:
+def _collect(workers: Sequence[_Worker]) -> list[RunOutcome]:
     """Make the calls that arrive, until every worker has its outcome."""
     speaking = {worker.receiver: worker for worker in workers}
     while True:
@@ -160,12 +160,12 @@ def _error(worker: _Worker) -> BaseException | None:
     return worker.future.exception()
 
 
-def _work(solve: Solve, piece: Any, sender: "Connection[Any, Any]") -> Outcome:
-    return solve(piece, _Forwarder(sender))
+def _work(solve: Solve, piece: Any, sender: "Connection[Any, Any]") -> RunOutcome:
+    return solve(piece, PipeObserver(sender))
 
 
 @dataclass(frozen=True)
-class _Forwarder(Observer):
+class PipeObserver(RunObserver):
     """The observer inside a process of its own: sends each call to the other side."""
 
     sender: "Connection[Any, Any]"
@@ -173,7 +173,7 @@ class _Forwarder(Observer):
     def stage(self, name: str, **details: Any) -> None:
         self.sender.send(("stage", (name,), details))
 
-    def step(self, **step: Unpack[Step]) -> None:
+    def step(self, **step: Unpack[StepReport]) -> None:
         self.sender.send(("step", (), dict(step)))
 
     def state(self, state: State) -> None:

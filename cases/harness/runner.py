@@ -12,7 +12,7 @@ from softehl.cases.harness import table
 from softehl.cases.harness.case import Alarm, Run
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.file_content import Content
-from softehl.cases.harness.observer import Observer, Outcome, State, Step
+from softehl.cases.harness.observer import RunObserver, RunOutcome, State, StepReport
 from softehl.cases.harness.process_pool import solve_side_by_side
 from softehl.cases.harness.progress import Display, make_display
 from softehl.cases.harness.resume import Existing
@@ -51,7 +51,7 @@ def compute(record: RunRecord, *, jobs: int, display: Display) -> list[str]:
 
     Raises BadInput like :func:`run_case`.
     """
-    run, outcomes = record.run, list[Outcome]()
+    run, outcomes = record.run, list[RunOutcome]()
     with _recorded(record):
         for parameters in run.case.rounds(run.parameters):
             pieces = run.case.pieces(parameters, record.curve.rows, jobs)
@@ -62,9 +62,11 @@ def compute(record: RunRecord, *, jobs: int, display: Display) -> list[str]:
 
 def _solve(
     run: Run, pieces: Sequence[Any], record: RunRecord, display: Display, jobs: int
-) -> list[Outcome]:
+) -> list[RunOutcome]:
     """Run parameter sets one after the other or, with jobs > 1, side by side."""
-    reporters = [Reporter(record, display, run.case.piece_name(piece)) for piece in pieces]
+    reporters = [
+        RecordingObserver(display, run.case.piece_name(piece), record=record) for piece in pieces
+    ]
     if jobs > 1 and len(pieces) > 1:
         outcomes = solve_side_by_side(run.solve, pieces, reporters)
         return [
@@ -76,61 +78,62 @@ def _solve(
     return [run.solve(*pair) for pair in zip(pieces, reporters, strict=True)]
 
 
-@dataclass(frozen=True)
-class Teller(Observer):
-    """Shows what a computation tells and keeps nothing of it."""
+@dataclass
+class DisplayObserver(RunObserver):
+    """Shows the stages, steps and states of a worker, and records nothing.
+
+    worker: its name, empty where it is the only one.
+    """
 
     display: Display
+    worker: str = ""
 
     def stage(self, name: str, *, title: str, where: Mapping[str, Any]) -> None:
-        """See :class:`Observer`."""
-        self.display.begin_stage("", title)
+        """See :class:`RunObserver`."""
+        self.display.begin_stage(self.worker, title)
 
-    def step(self, **step: Unpack[Step]) -> None:
-        """See :class:`Observer`."""
-        self.display.step("", f"{step['label']} = {step['parameter']:.4g}", step["fraction"])
+    def step(self, **step: Unpack[StepReport]) -> None:
+        """See :class:`RunObserver`."""
+        text = f"{step['label']} = {step['parameter']:.4g}"
+        self.display.step(self.worker, text, step["fraction"])
 
     def state(self, state: State) -> None:
-        """See :class:`Observer`."""
+        """See :class:`RunObserver`."""
         self.display.state(state.row)
 
 
-@dataclass
-class Reporter(Observer):
-    """Passes on what one worker of a run tells: to the record first, then to the display."""
+@dataclass(kw_only=True)
+class RecordingObserver(DisplayObserver):
+    """Records what one worker of a run reports, then shows it."""
 
     record: RunRecord
-    display: Display
-    worker: str
     log: StageLog | None = None
 
     def stage(self, name: str, *, title: str, where: Mapping[str, Any]) -> None:
-        """See :class:`Observer`."""
+        """See :class:`RunObserver`."""
         with writing(self.record.folder):
             self.log = self.record.open_stage(name, where)
-        self.display.begin_stage(self.worker, title)
+        super().stage(name, title=title, where=where)
 
-    def step(self, **step: Unpack[Step]) -> None:
-        """See :class:`Observer`."""
+    def step(self, **step: Unpack[StepReport]) -> None:
+        """See :class:`RunObserver`."""
         if self.log is not None:
             self.log.step(step["parameter"], step["iterations"], step["residuals"])
-        self.display.step(
-            self.worker, f"{step['label']} = {step['parameter']:.4g}", step["fraction"]
-        )
+        super().step(**step)
 
     def state(self, state: State) -> None:
-        """See :class:`Observer`."""
+        """See :class:`RunObserver`."""
         with writing(self.record.folder):
-            row = self.record.state(state)
-        self.display.state(row)
+            self.record.state(state)
+        super().state(state)
 
     def files(self, contents: Mapping[str, Content]) -> None:
-        """See :class:`Observer`."""
+        """See :class:`RunObserver`."""
         with writing(self.record.folder):
             self.record.files(contents)
 
     def saved_row(self, key: float) -> tuple[Row, Sequence[Mapping[str, Array]]] | None:
-        """See :class:`Observer`."""
+        """See :class:`RunObserver`."""
         for row in self.record.curve.rows:
             if row.key == key:
                 paths = [self.record.folder / name for name in row.file_names()]
@@ -138,12 +141,12 @@ class Reporter(Observer):
         return None
 
     def draft(self, key: float, arrays: Mapping[str, Array]) -> None:
-        """See :class:`Observer`."""
+        """See :class:`RunObserver`."""
         with writing(self.record.folder):
             self.record.draft(key, arrays)
 
     def drafted(self, key: float) -> Mapping[str, Array] | None:
-        """See :class:`Observer`."""
+        """See :class:`RunObserver`."""
         return self.record.drafted(key)
 
 
@@ -175,7 +178,7 @@ def writing(folder: Path) -> Iterator[None]:
         raise BadInput(f"cannot write {where!r}: {error.strerror or error}") from None
 
 
-def _conclude(record: RunRecord, outcomes: Sequence[Outcome]) -> list[str]:
+def _conclude(record: RunRecord, outcomes: Sequence[RunOutcome]) -> list[str]:
     """Complete the record; return what is missing."""
     record.begin()
     record.set_outcomes(outcomes)
@@ -213,7 +216,7 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
     return NOT_CONVERGED
 
 
-def _failures(outcomes: Sequence[Outcome]) -> list[str]:
+def _failures(outcomes: Sequence[RunOutcome]) -> list[str]:
     """Messages of the runs that stopped early."""
     return [
         f"{outcome.status.value}: {' '.join(outcome.message.split())}"

@@ -18,7 +18,7 @@ from softehl.cases.harness.errors import BadInput
 from softehl.runtime.arrays import Array
 from softehl.runtime.suggestions import did_you_mean
 
-F = TypeVar("F", bound="Form")
+F = TypeVar("F", bound="StudyTable")
 Points: TypeAlias = list[dict[str, Any]]
 Read: TypeAlias = Callable[[str, object], Any]
 """(key, value as it was typed) -> value in the unit of the key.  Raises BadInput."""
@@ -32,13 +32,13 @@ NORMAL_DEVIATIONS = 2.0
 _SHARE = re.compile(r"(\+-\s*)?(?P<size>\d+(\.\d*)?([eE][-+]?\d+)?)\s*%")
 
 
-class Form(BaseModel):
+class StudyTable(BaseModel):
     """Allowed content of a table of a study."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class Span(Form):
+class Span(StudyTable):
     """Equally spaced values of a key: {from = 1, to = 2, count = 5}, or of its logarithm."""
 
     start: Any = Field(alias="from")
@@ -47,7 +47,7 @@ class Span(Form):
     spacing: Literal["linear", "log"] = "linear"
 
 
-class Hypercube(Form):
+class Hypercube(StudyTable):
     """[latin_hypercube]: a number of points that fill the box between bounds of each key."""
 
     count: int = Field(ge=1, le=MOST)
@@ -55,7 +55,7 @@ class Hypercube(Form):
     between: dict[str, Any] = Field(min_length=1)
 
 
-class Random(Form):
+class Random(StudyTable):
     """[random]: keys that are off by independent tolerances."""
 
     count: int = Field(ge=1, le=MOST)

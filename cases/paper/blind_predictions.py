@@ -7,8 +7,8 @@ from typing import Any
 
 from softehl.cases.paper.checks import LETTERS, observed_order
 from softehl.cases.paper.curves import ORDERS
-from softehl.cases.paper.figure_spec import STUDY_DENSITIES, Item, Product, Scope, Table
-from softehl.cases.paper.states import PAPER, STABILISED, Request, State, Store, ask, setup
+from softehl.cases.paper.figure_spec import STUDY_DENSITIES, CsvTable, Item, Product, Scope
+from softehl.cases.paper.states import PAPER, STABILISED, Request, RequestedState, Store, ask, setup
 from softehl.cases.seal.gland.records import DENSITIES
 from softehl.runtime.io import Cell
 
@@ -42,7 +42,7 @@ def jumps(store: Store, scope: Scope) -> Product:
         *("verdicts", "order_of_last_two"),
     )
     caption = f"Outstroke, p_s = {p_s:g} MPa, U = {u:g} mm/s."
-    return Product({"jumps": Table(header, rows)}, caption)
+    return Product({"jumps": CsvTable(header, rows)}, caption)
 
 
 # --- Sec. 5.3: how much the piezo-viscous effect changes ----------------------------------------
@@ -69,7 +69,7 @@ def piezo(store: Store, scope: Scope) -> Product:
     return Product(tables, caption)
 
 
-def _piezo_table(store: Store, scope: Scope, scheme: dict[str, Any]) -> Table:
+def _piezo_table(store: Store, scope: Scope, scheme: dict[str, Any]) -> CsvTable:
     u, p_s = scope.speed(100.0), scope.pressure(5.0)
     densities = scope.meshes(STUDY_DENSITIES, default=8)
     rows: list[list[Cell]] = []
@@ -87,10 +87,10 @@ def _piezo_table(store: Store, scope: Scope, scheme: dict[str, Any]) -> Table:
         *(f"density_{d}" for d in densities),
         *("verdicts", "observed_order", "extrapolated"),
     )
-    return Table(header, rows)
+    return CsvTable(header, rows)
 
 
-def _piezo_rows(stroke: str, pairs: list[list[State]]) -> list[list[Cell]]:
+def _piezo_rows(stroke: str, pairs: list[list[RequestedState]]) -> list[list[Cell]]:
     """Rows of one stroke from pairs of states with and without (13)."""
     marks = "".join(LETTERS.get(barus.verdict, "-") for barus, _ in pairs)
     rows: list[list[Cell]] = []
@@ -104,11 +104,11 @@ def _piezo_rows(stroke: str, pairs: list[list[State]]) -> list[list[Cell]]:
     return rows
 
 
-def _change(barus: State, plain: State, name: str) -> float:
+def _change(barus: RequestedState, plain: RequestedState, name: str) -> float:
     return 100.0 * (_number(barus, name) / _number(plain, name) - 1.0)
 
 
-def _number(state: State, name: str) -> float:
+def _number(state: RequestedState, name: str) -> float:
     return float(getattr(state.row, name)) if state.row is not None and state.usable else nan
 
 

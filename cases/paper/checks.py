@@ -16,17 +16,17 @@ import numpy as np
 from softehl.cases.paper import drawing
 from softehl.cases.paper.figure_spec import (
     STUDY_DENSITIES,
+    CsvTable,
     Item,
     Product,
     Scope,
-    Table,
     both,
     density_words,
     state_table,
     with_all,
 )
 from softehl.cases.paper.lookup import ripple
-from softehl.cases.paper.states import PAPER, STABILISED, Request, State, Store, ask, setup
+from softehl.cases.paper.states import PAPER, STABILISED, Request, RequestedState, Store, ask, setup
 from softehl.cases.paper.tables import counted
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
@@ -67,7 +67,7 @@ def matrix(store: Store, scope: Scope) -> Product:
         f"A letter for each |U| = {', '.join(f'{u:g}' for u in speeds)} mm/s: . ok, o oscillating,"
         " U under-resolved, C collapsed, - not reached, ? not run to its end."
     )
-    tables = {"matrix": Table(header, rows), "matrix_states": state_table(states)}
+    tables = {"matrix": CsvTable(header, rows), "matrix_states": state_table(states)}
     return Product(tables, caption)
 
 
@@ -110,7 +110,7 @@ def mesh_study(store: Store, scope: Scope) -> Product:
     return Product(tables, caption)
 
 
-def _study(store: Store, scope: Scope, scheme: dict[str, Any]) -> Table:
+def _study(store: Store, scope: Scope, scheme: dict[str, Any]) -> CsvTable:
     densities = scope.meshes(STUDY_DENSITIES, default=8)
     rows: list[list[Cell]] = []
     for p_s in scope.some_pressures(STUDY_PRESSURES):
@@ -125,7 +125,7 @@ def _study(store: Store, scope: Scope, scheme: dict[str, Any]) -> Table:
         *(f"h_star_um_density_{d}" for d in densities),
         *("verdicts", "observed_order", "extrapolated_um"),
     )
-    return Table(header, rows)
+    return CsvTable(header, rows)
 
 
 # --- net leakage --------------------------------------------------------------------------------
@@ -161,7 +161,7 @@ def leakage(store: Store, scope: Scope) -> Product:
 
     note = " What leaves in a cycle per unit of stroke and area; positive: the seal leaks."
     caption = density_words(scope.mesh(16), 16) + note + " Hollow: not ok."
-    return Product({"leakage": Table(LeakageRow.header(), cells)}, caption, draw, (4.6, 3.2))
+    return Product({"leakage": CsvTable(LeakageRow.header(), cells)}, caption, draw, (4.6, 3.2))
 
 
 # --- the shear traction -------------------------------------------------------------------------
@@ -199,13 +199,13 @@ def shear(store: Store, scope: Scope) -> Product:
     )
     p_s = with_it.sealed_pressure
     caption = f"{density_words(scope.mesh(16), 16)} p_s = {p_s:g} MPa, mean rotation held."
-    return Product({"shear": Table(header, rows)}, caption)
+    return Product({"shear": CsvTable(header, rows)}, caption)
 
 
 _ENDS = ("contact_start_mm", "contact_end_mm")
 
 
-def _movement(a: State, b: State) -> tuple[float, float]:
+def _movement(a: RequestedState, b: RequestedState) -> tuple[float, float]:
     """Of the nodes in b's contact the mean axial movement from b to a, and the largest, um."""
     points = [np.asarray(meshio.read(_section(s)).points)[:, :2] for s in (a, b)]
     moved = 1e3 * (points[0] - points[1])
@@ -217,7 +217,7 @@ def _movement(a: State, b: State) -> tuple[float, float]:
     return shift, float(np.hypot(*moved.T).max())
 
 
-def _section(state: State) -> str:
+def _section(state: RequestedState) -> str:
     assert state.row is not None
     assert state.folder is not None
     _, section = state.row.file_names()
@@ -263,7 +263,7 @@ def onset(store: Store, scope: Scope) -> Product:
     caption = (
         "Largest rise of h on the way from the inlet to the dip, in h*; a smooth film has none."
     )
-    return Product({"onset": Table(header, rows)}, caption)
+    return Product({"onset": CsvTable(header, rows)}, caption)
 
 
 ONSET_ITEMS = (Item("onset", "Onset of oscillations", onset, _onset_requests),)
@@ -303,7 +303,7 @@ def points(store: Store, scope: Scope) -> Product:
         f"h*, FE, m_p = {POINT_ORDER}, outstroke, p_s = {scope.pressure(1.0):g} MPa, "
         f"U = {u:g} mm/s."
     )
-    return Product({"points": Table(header, rows)}, caption)
+    return Product({"points": CsvTable(header, rows)}, caption)
 
 
 POINT_ITEMS = (Item("points", "Number of quadrature points", points, _point_requests),)
@@ -358,7 +358,7 @@ def arc(store: Store, scope: Scope) -> Product:
         *("h_star_um", "change_percent", "verdict"),
     )
     note = f" p_s = {scope.pressure(1.0):g} MPa; changes against the first arc."
-    return Product({"arc": Table(header, rows)}, density_words(scope.mesh(16), 16) + note)
+    return Product({"arc": CsvTable(header, rows)}, density_words(scope.mesh(16), 16) + note)
 
 
 # --- the outstroke without cavitation -----------------------------------------------------------
@@ -392,7 +392,7 @@ def cavitation(store: Store, scope: Scope) -> Product:
         *("friction_change_percent", "verdict", "verdict_without"),
     )
     caption = f"{density_words(scope.mesh(16), 16)} Changes: without the penalty against with it."
-    return Product({"cavitation": Table(header, rows)}, caption)
+    return Product({"cavitation": CsvTable(header, rows)}, caption)
 
 
 def _changes(states: list[Any]) -> list[float]:
@@ -439,7 +439,7 @@ def order_cost(store: Store, scope: Scope) -> Product:
         "Of the runs of Fig. 16: unknowns, and iterations and seconds from the dry contact to the"
         " film and its shear stress, outstroke; ratios to m_p = 1 on the same mesh."
     )
-    return Product({"order_cost": Table(header, rows)}, caption)
+    return Product({"order_cost": CsvTable(header, rows)}, caption)
 
 
 CHOICE_ITEMS = (

@@ -15,7 +15,7 @@ import numpy as np
 from softehl.cases.paper import blind_predictions, checks, curves, inverse_theory, profiles, tables
 from softehl.cases.paper.checks import observed_order
 from softehl.cases.paper.curves import ORDERS
-from softehl.cases.paper.figure_spec import STUDY_DENSITIES, Item, Product, Scope, Table
+from softehl.cases.paper.figure_spec import STUDY_DENSITIES, CsvTable, Item, Product, Scope
 from softehl.cases.paper.lookup import (
     Finding,
     Measure,
@@ -640,7 +640,7 @@ def statements(store: Store, scope: Scope) -> Product:
         rows.append((str(number), statement.reference, statement.text, finding.text, verdict))
     header = ("number", "place", "statement", "measured", "holds")
     caption = "Measured from the runs of the other items."
-    return Product({"statements": Table(header, rows)}, caption)
+    return Product({"statements": CsvTable(header, rows)}, caption)
 
 
 ITEMS = (Item("statements", "The paper's statements", statements, _requests),)

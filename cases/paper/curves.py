@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper import drawing
-from softehl.cases.paper.drawing import Line
+from softehl.cases.paper.drawing import SeriesLine
 from softehl.cases.paper.figure_spec import (
     Item,
     Product,
@@ -76,7 +76,7 @@ def _product(name: str, chart: Chart, store: Store) -> Product:
             axes.set_title(title)
             axes.set_xlabel(chart.abscissa)
         for s, some in states_by_series:
-            line = Line(s.label, s.x, some, colors[s.shade], s.style)
+            line = SeriesLine(s.label, s.x, some, colors[s.shade], s.style)
             drawing.draw_line(panels[s.panel], line)
         panels[0].set_ylabel(drawing.H_STAR)
         for axes in panels:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper.figure_spec import Product
-from softehl.cases.paper.states import State
+from softehl.cases.paper.states import RequestedState
 from softehl.cases.seal.states.state import Profile
 from softehl.runtime.io import replacing
 
@@ -73,7 +73,7 @@ def shades(number: int) -> list[Any]:
 
 def draw_profile(
     axes: Axes,
-    state: State,
+    state: RequestedState,
     values: Callable[[Profile], Any],
     label: str,
     color: Any,
@@ -98,18 +98,18 @@ def film(profile: Profile) -> Any:
 
 
 @dataclass(frozen=True)
-class Line:
+class SeriesLine:
     """A series of h* over something: states with their abscissas, label, colour, line style."""
 
     label: str
     x: Sequence[float]
-    states: Sequence[State]
+    states: Sequence[RequestedState]
     color: Any
     style: str = "-"
     marker: str = "o"
 
 
-def draw_line(axes: Axes, line: Line) -> None:
+def draw_line(axes: Axes, line: SeriesLine) -> None:
     """A curve whose markers are full for states that are ok; others are hollow, with a letter."""
     usable = [(x, s) for x, s in zip(line.x, line.states, strict=True) if s.usable]
     axes.plot(
@@ -155,7 +155,7 @@ def logarithmic(axes: Any, *, x: bool, y: bool) -> None:
 
 
 def around_contact(
-    axes: Axes, states: Sequence[State], around: tuple[str, float, float] | None = None
+    axes: Axes, states: Sequence[RequestedState], around: tuple[str, float, float] | None = None
 ) -> None:
     """Show the contact only, or what is `around` one of its ends."""
     rows = [s.row for s in states if s.row is not None and s.usable]

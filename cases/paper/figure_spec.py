@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from softehl.cases.paper.states import SPEEDS, Request, State, Store
+from softehl.cases.paper.states import SPEEDS, Request, RequestedState, Store
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import DENSITIES
 from softehl.runtime.io import Cell
@@ -60,7 +60,7 @@ def _nearest(target: float, allowed: Sequence[float] | None) -> float:
 
 
 @dataclass(frozen=True)
-class Table:
+class CsvTable:
     """Header and rows of a CSV file."""
 
     header: tuple[str, ...]
@@ -75,7 +75,7 @@ class Product:
     inches, None for a table.
     """
 
-    tables: Mapping[str, Table]
+    tables: Mapping[str, CsvTable]
     caption: str
     draw: "Callable[[Figure], None] | None" = None
     size: tuple[float, float] = (7.2, 3.4)
@@ -100,12 +100,12 @@ STATE_COLUMNS = (
 _FROM_ROW = STATE_COLUMNS[10:-1]
 
 
-def state_table(series: Sequence[tuple[str, State]]) -> Table:
+def state_table(series: Sequence[tuple[str, RequestedState]]) -> CsvTable:
     """The states of a figure with the label of the series that each belongs to."""
-    return Table(STATE_COLUMNS, [_state_row(label, state) for label, state in series])
+    return CsvTable(STATE_COLUMNS, [_state_row(label, state) for label, state in series])
 
 
-def _state_row(label: str, state: State) -> list[Cell]:
+def _state_row(label: str, state: RequestedState) -> list[Cell]:
     p = state.setup
     numbers = [getattr(state.row, name) if state.row else float("nan") for name in _FROM_ROW]
     return [
@@ -119,7 +119,7 @@ def _state_row(label: str, state: State) -> list[Cell]:
 PROFILE_HEADER = ("series", "verdict", "x_mm", "h_um", "p_MPa")
 
 
-def profile_table(series: Sequence[tuple[str, State]]) -> Table:
+def profile_table(series: Sequence[tuple[str, RequestedState]]) -> CsvTable:
     """The profiles that are drawn, one below the other."""
     rows: list[Sequence[Cell]] = []
     for label, state in series:
@@ -127,7 +127,7 @@ def profile_table(series: Sequence[tuple[str, State]]) -> Table:
             profile = state.profile
             columns = (profile.x_mm.tolist(), profile.h_um.tolist(), profile.p_MPa.tolist())
             rows += [(label, state.verdict, *row) for row in zip(*columns, strict=True)]
-    return Table(PROFILE_HEADER, rows)
+    return CsvTable(PROFILE_HEADER, rows)
 
 
 def density_words(used: int | Sequence[int], paper: int | Sequence[int]) -> str:
@@ -140,7 +140,7 @@ def density_words(used: int | Sequence[int], paper: int | Sequence[int]) -> str:
     )
 
 
-def verdict_note(states: Sequence[State]) -> str:
+def verdict_note(states: Sequence[RequestedState]) -> str:
     """The states whose verdict is not ok, by verdict; empty if there are none."""
     names_by_verdict: dict[str, list[str]] = {}
     for state in states:
@@ -153,7 +153,7 @@ def verdict_note(states: Sequence[State]) -> str:
     return f" Marked, because not ok - {'; '.join(named)}." if named else ""
 
 
-def _short(state: State, among: Sequence[State]) -> str:
+def _short(state: RequestedState, among: Sequence[RequestedState]) -> str:
     """A state in as few words as tell it from the others."""
     parts = [f"U {state.rod_speed:+g}"]
     others: list[tuple[str, str]] = [

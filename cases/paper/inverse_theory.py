@@ -17,8 +17,8 @@ from math import nan, sqrt
 
 import numpy as np
 
-from softehl.cases.paper.figure_spec import STUDY_DENSITIES, Item, Product, Scope, Table, both
-from softehl.cases.paper.states import Request, State, Store, ask, setup
+from softehl.cases.paper.figure_spec import STUDY_DENSITIES, CsvTable, Item, Product, Scope, both
+from softehl.cases.paper.states import Request, RequestedState, Store, ask, setup
 from softehl.cases.seal.gland.records import Oil
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import Cell
@@ -69,10 +69,10 @@ def inverse(store: Store, scope: Scope) -> Product:
         *("from_dry_contact_um", "from_film_pressure_um"),
     )
     caption = "h* = sqrt(8 |U| / (9 w)), w the largest |dp/dx| / eta of the inlet."
-    return Product({"inverse": Table(header, rows)}, caption)
+    return Product({"inverse": CsvTable(header, rows)}, caption)
 
 
-def _row(store: Store, state: State) -> list[Cell]:
+def _row(store: Store, state: RequestedState) -> list[Cell]:
     ring, u = state.setup, state.rod_speed
     dry, film = nan, nan
     contact = store.contact(ring)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from softehl.cases.paper.figure_spec import Scope
-from softehl.cases.paper.states import State, Store, setup
+from softehl.cases.paper.states import RequestedState, Store, setup
 from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.arrays import Array
 
@@ -45,7 +45,7 @@ class Query:
         """The pressures of the matrix, rising."""
         return self.scope.some_pressures((0.0, 1.0, 2.0, 5.0))
 
-    def state(self, density: int, p_s: float, speed: float, **others: Any) -> State:
+    def state(self, density: int, p_s: float, speed: float, **others: Any) -> RequestedState:
         """A state at a signed speed."""
         u = self.scope.speed(abs(speed)) * (1.0 if speed > 0 else -1.0)
         return self.store.state(setup(density, self.scope.pressure(p_s), **others), u)
@@ -105,7 +105,7 @@ def _crossing(x: Array, h: Array, i: int, level: float) -> float:
     return float(x[i - 1] + share * (x[i] - x[i - 1]))
 
 
-def ripple(state: State) -> float:
+def ripple(state: RequestedState) -> float:
     """Largest rise of h towards the outlet before the dip, in h*; nan if there is no film.
 
     A smooth film falls from the inlet to the dip at the outlet: what rises on the way is an
@@ -126,7 +126,7 @@ def ripple(state: State) -> float:
     return float((film - np.minimum.accumulate(film)).max() / state.h_star)
 
 
-def difference(a: State, b: State, margin: float = 0.0) -> float:
+def difference(a: RequestedState, b: RequestedState, margin: float = 0.0) -> float:
     """Largest difference of the pressures of two states over the contact of b, MPa.
 
     margin: share of the contact left out at either end.

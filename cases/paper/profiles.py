@@ -17,7 +17,7 @@ from softehl.cases.paper.figure_spec import (
     state_table,
     verdict_note,
 )
-from softehl.cases.paper.states import Request, State, Store, ask, setup
+from softehl.cases.paper.states import Request, RequestedState, Store, ask, setup
 from softehl.cases.seal.gland.records import DENSITIES
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ Limits = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Curve:
+class ProfileCurve:
     """One line of a figure: the state it shows and how it is called."""
 
     label: str
@@ -52,7 +52,7 @@ class Panel:
 
     title: str
     value: Value
-    curves: Sequence[Curve]
+    curves: Sequence[ProfileCurve]
     around: tuple[str, float, float] | None = None
     y: Limits | None = None
     log: bool = False
@@ -67,14 +67,14 @@ class Sheet:
     columns: int = 2
 
     @property
-    def curves(self) -> list[Curve]:
+    def curves(self) -> list[ProfileCurve]:
         """Every curve, once."""
         return list({(c.label, c.request): c for p in self.panels for c in p.curves}.values())
 
 
-def curve(label: str, density: int, p_s: float, speed: float, **others: Any) -> Curve:
+def curve(label: str, density: int, p_s: float, speed: float, **others: Any) -> ProfileCurve:
     """A line for one state."""
-    return Curve(label, ask(setup(density, p_s, **others), [speed]))
+    return ProfileCurve(label, ask(setup(density, p_s, **others), [speed]))
 
 
 def sheet_item(name: str, title: str, sheet: Callable[[Scope], Sheet]) -> Item:
@@ -107,7 +107,7 @@ def _product(name: str, sheet: Sheet, store: Store) -> Product:
     return Product(tables, caption, draw, (3.6 * sheet.columns, 2.9 * rows))
 
 
-def _draw_panel(axes: Axes, panel: Panel, shown: dict[Curve, State]) -> None:
+def _draw_panel(axes: Axes, panel: Panel, shown: dict[ProfileCurve, RequestedState]) -> None:
     for c, color in zip(panel.curves, drawing.shades(len(panel.curves)), strict=True):
         drawing.draw_profile(axes, shown[c], panel.value, c.label, color)
     states = [shown[c] for c in panel.curves]
@@ -126,7 +126,7 @@ def _draw_panel(axes: Axes, panel: Panel, shown: dict[Curve, State]) -> None:
     axes.legend()
 
 
-def pressure_and_film(curves: Sequence[Curve], **limits: Any) -> list[Panel]:
+def pressure_and_film(curves: Sequence[ProfileCurve], **limits: Any) -> list[Panel]:
     """Panels (a) pressure and (b) film thickness of the same curves."""
     return [
         Panel("pressure", drawing.pressure, curves, **limits),
@@ -163,7 +163,9 @@ def fig_6(scope: Scope) -> Sheet:
     return Sheet(panels, f"{density_words(density, 16)} p_s = {p_s:g} MPa, |U| = {u:g} mm/s.")
 
 
-def _falling(scope: Scope, density: int, p_s: float, sign: float, **others: Any) -> list[Curve]:
+def _falling(
+    scope: Scope, density: int, p_s: float, sign: float, **others: Any
+) -> list[ProfileCurve]:
     """One stroke at falling speed."""
     return [
         curve(f"{sign * u:+g}", density, p_s, sign * u, **others)

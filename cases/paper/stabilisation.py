@@ -6,8 +6,8 @@ from math import isnan, nan
 from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper import drawing
-from softehl.cases.paper.figure_spec import Item, Product, Scope, Table, both
-from softehl.cases.paper.states import STABILISED, Request, State, Store, ask, setup
+from softehl.cases.paper.figure_spec import CsvTable, Item, Product, Scope, both
+from softehl.cases.paper.states import STABILISED, Request, RequestedState, Store, ask, setup
 from softehl.runtime.io import Cell
 
 if TYPE_CHECKING:
@@ -60,14 +60,20 @@ def stabilisation(store: Store, scope: Scope) -> Product:
     def draw(figure: Figure) -> None:
         _draw(figure, store, scope)
 
-    return Product({"stabilisation": Table(header, rows)}, caption, draw, (10.8, 3.1))
+    return Product({"stabilisation": CsvTable(header, rows)}, caption, draw, (10.8, 3.1))
 
 
-def _row(p_s: float, u: float, paper: State, stabilised: State, reference: State) -> list[Cell]:
-    def error(state: State) -> float:
+def _row(
+    p_s: float,
+    u: float,
+    paper: RequestedState,
+    stabilised: RequestedState,
+    reference: RequestedState,
+) -> list[Cell]:
+    def error(state: RequestedState) -> float:
         return 100.0 * (state.h_star / reference.h_star - 1.0)
 
-    def oscillation(state: State) -> float:
+    def oscillation(state: RequestedState) -> float:
         return state.row.oscillation_index if state.row else nan
 
     estimate = stabilised.row.h_star_error_percent if stabilised.row else nan
@@ -117,7 +123,7 @@ def _curves(axes: Axes, store: Store, scope: Scope, p_s: float) -> None:
     labels = (*_LABELS, f"stabilised, density {_finest(scope)}")
     for which, label, color in zip([*sets, reference], labels, (*_COLOURS, "0.6"), strict=True):
         states = store.states(which, speeds)
-        line = drawing.Line(label, [abs(u) for u in speeds], states, color)
+        line = drawing.SeriesLine(label, [abs(u) for u in speeds], states, color)
         drawing.draw_line(axes, line)
     drawing.logarithmic(axes, x=True, y=True)
     axes.set_xlabel("rod speed $|U|$ [mm/s]")

@@ -1,7 +1,7 @@
 """States that figures share: what is asked for, where it is kept, and how it is read back.
 
 Each set of parameters is one ordinary run folder in `runs/`; speeds and strokes are what a run
-may add to. A state that a run did not reach, or that collapsed, is still a :class:`State`.
+may add to. A state that a run did not reach, or that collapsed, is still a :class:`RequestedState`.
 """
 
 from collections.abc import Iterable, Sequence
@@ -93,7 +93,7 @@ def merged(requests: Iterable[Request]) -> list[Request]:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class RequestedState:
     """A requested state: its row and files if there are any, and its verdict in any case.
 
     folder: the folder of its files.
@@ -154,16 +154,16 @@ class Store:
         path = self.run_folder(parameters) / "run.json"
         return path.exists() and read_json(path).get("status") in ENDED
 
-    def state(self, parameters: Seal, rod_speed: float) -> State:
+    def state(self, parameters: Seal, rod_speed: float) -> RequestedState:
         """The state at a signed speed U, mm/s."""
         run = self.run_folder(parameters)
         for folder in (run, run / "rejected"):
             for row in self._read(folder):
                 if row.rod_speed_mm_s == rod_speed:
-                    return State(parameters, rod_speed, row, folder)
-        return State(parameters, rod_speed)
+                    return RequestedState(parameters, rod_speed, row, folder)
+        return RequestedState(parameters, rod_speed)
 
-    def states(self, parameters: Seal, speeds: Sequence[float]) -> list[State]:
+    def states(self, parameters: Seal, speeds: Sequence[float]) -> list[RequestedState]:
         """The states at several signed speeds."""
         return [self.state(parameters, u) for u in speeds]
 

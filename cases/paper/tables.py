@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softehl.cases.paper.figure_spec import Item, Product, Scope, Table, density_words
+from softehl.cases.paper.figure_spec import CsvTable, Item, Product, Scope, density_words
 from softehl.cases.paper.states import SPEEDS, Request, Store, ask, setup
 from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
@@ -50,7 +50,7 @@ def table_1(_: Store, __: Scope) -> Product:
     )
     rows.append(("Sealed pressure, p_s", "sealed_pressure", "0 to 5", "0-5", "MPa"))
     header = ("quantity", "key", "softehl", "paper", "unit")
-    return Product({"table1": Table(header, rows)}, "The defaults of the case oring.")
+    return Product({"table1": CsvTable(header, rows)}, "The defaults of the case oring.")
 
 
 def table_2_densities(scope: Scope) -> tuple[int, ...]:
@@ -77,7 +77,7 @@ def table_2(_: Store, scope: Scope) -> Product:
         total, film = unknowns(density)
         rows.append((density, total, TABLE_2[density][0], film, TABLE_2[density][1]))
     header = ("density", "unknowns", "unknowns_paper", "pressures", "pressures_paper")
-    return Product({"table2": Table(header, rows)}, "Numbers of unknowns, m_p = 4.")
+    return Product({"table2": CsvTable(header, rows)}, "Numbers of unknowns, m_p = 4.")
 
 
 def fig_3(_: Store, scope: Scope) -> Product:
@@ -105,7 +105,7 @@ def fig_3(_: Store, scope: Scope) -> Product:
 
     note = " Rod (upper line) on the top, sealed side on the left; the ring is not yet squeezed."
     caption = density_words(densities, (1, 2)) + note
-    return Product({"fig3": Table(header, rows)}, caption, draw, (5.6, 2.9))
+    return Product({"fig3": CsvTable(header, rows)}, caption, draw, (5.6, 2.9))
 
 
 def _quads(axes: Axes, corners: Any) -> None:
@@ -157,7 +157,7 @@ def fig_4(store: Store, scope: Scope) -> Product:
         " Rod on the top, sealed side on the left; short lines: the ends of gamma. Drawn from the"
         " frictionless contact stage (the film is thinner than a line)."
     )
-    return Product({"fig4": Table(header, rows)}, caption, draw, (5.6, 4.8))
+    return Product({"fig4": CsvTable(header, rows)}, caption, draw, (5.6, 4.8))
 
 
 def _section(axes: Axes, p: Seal, store: Store) -> None:

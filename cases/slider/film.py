@@ -29,7 +29,7 @@ from softehl.runtime.study import Study
 
 
 @dataclass(frozen=True)
-class Oil:
+class FilmOil:
     """Viscosity (MPa s) at zero pressure, Barus' coefficient (1/MPa), pressure of cavitation.
 
     suffix, thinning: how it thins under shear, see `ThinningKeys`.
@@ -43,7 +43,7 @@ class Oil:
 
 
 @dataclass(frozen=True, eq=False)
-class Strip:
+class GapFilm:
     """Segments of a film with pressures and void fractions at the nodes of their subcells.
 
     x, h: (n, 2) places and thicknesses of the ends of the segments, mm; h may jump between them.
@@ -53,7 +53,7 @@ class Strip:
     x: Array
     h: Array
     order: int
-    oil: Oil
+    oil: FilmOil
     surfaces: SurfacePair = field(default_factory=SurfacePair)
 
     @property
@@ -171,12 +171,12 @@ def beyond_front(x: Array, p: Array, front: float) -> float:
     return float(0.5 * p[j] * (front - x[j - 1])) if j < len(x) else 0.0
 
 
-def strip_of(p: Slider, alpha: float) -> Strip:
+def strip_of(p: Slider, alpha: float) -> GapFilm:
     """The film of a slider that conserves mass; alpha: coefficient of Barus' law."""
     surfaces = SurfacePair.of(p.roughness, p.asperity_stiffness, p.boundary_friction)
     thinning = p.film_suffix, p.thinning_values(p.viscosity)
-    oil = Oil(p.viscosity, alpha, p.cavitation_pressure, *thinning)
-    return Strip(*p.segment_ends, p.pressure_order, oil, surfaces)
+    oil = FilmOil(p.viscosity, alpha, p.cavitation_pressure, *thinning)
+    return GapFilm(*p.segment_ends, p.pressure_order, oil, surfaces)
 
 
 def conserving_problem(p: Slider, speed: float, alpha: float) -> Problem:

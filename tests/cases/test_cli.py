@@ -30,11 +30,11 @@ from softehl.cases.seal.states.state import (
     COLLAPSED,
     ContactState,
     FilmState,
+    LoadStageRecord,
     Observer,
     Outcome,
     Profile,
     Section,
-    StageRecord,
     operating_point,
 )
 from softehl.runtime.kernels.kernel import MissingKernelsError
@@ -65,7 +65,7 @@ FILES = {
 USED = {"film": kernel_signatures()["film"]}
 
 
-Solve = Callable[[Seal, Observer], harness.Outcome]
+Solve = Callable[[Seal, Observer], harness.RunOutcome]
 
 
 class Fake(ORingCase):
@@ -75,8 +75,8 @@ class Fake(ORingCase):
         self.solver = solver
 
     def solve(
-        self, parameters: Seal, observer: harness.Observer, shared: Path | None
-    ) -> harness.Outcome:
+        self, parameters: Seal, observer: harness.RunObserver, shared: Path | None
+    ) -> harness.RunOutcome:
         return self.solver(parameters, ObserverAdapter(observer))
 
 
@@ -138,7 +138,7 @@ def solve(parameters: Seal, observer: Observer) -> Outcome:
 
 
 def outcome(*states: FilmState, status: Status = Status.CONVERGED, message: str = "") -> Outcome:
-    stage = StageRecord(
+    stage = LoadStageRecord(
         "contact", 0.5, 4, 3, ((1.0, 1e-2, 1e-5),), (1.0,), operating_point(1.0, "out")
     )
     unknowns = {"total": 1234, "pressure": 109}

@@ -16,7 +16,7 @@ import softehl
 from softehl.cases.cycle import CASE, Cycle, cycle_row
 from softehl.cases.seal.cycle import cycle_driver
 from softehl.cases.seal.cycle.cycle_driver import Films
-from softehl.cases.seal.cycle.motion import Motion, RodFilm, Table
+from softehl.cases.seal.cycle.motion import Motion, RodFilm, TimeTable
 from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.equations.definition import FILM, PRESSURE, SQUEEZE, VOID
 from softehl.cases.seal.gland.parameters import Seal
@@ -24,7 +24,7 @@ from softehl.cases.seal.report.cycle import (
     loop_figure,
     write_animation,
 )
-from softehl.cases.slider.film import Oil, Strip
+from softehl.cases.slider.film import FilmOil, GapFilm
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation import quadrature
 from softehl.runtime.discretisation.problem import Problem
@@ -37,14 +37,14 @@ ETA = 6.59e-8
 Gap = Callable[[float], float]
 
 
-def strip(h: float, segments: int = 8, length: float = 1.0) -> Strip:
+def strip(h: float, segments: int = 8, length: float = 1.0) -> GapFilm:
     """A film between parallel plates."""
     nodes = np.linspace(0.0, length, segments + 1)
     x = np.stack([nodes[:-1], nodes[1:]], axis=1)
-    return Strip(x, np.full_like(x, h), 4, Oil(ETA))
+    return GapFilm(x, np.full_like(x, h), 4, FilmOil(ETA))
 
 
-def problem_of(one: Strip, speed: float) -> Problem:
+def problem_of(one: GapFilm, speed: float) -> Problem:
     """The film of a strip, and what it holds as a block of its own, at rest."""
     study, content = one.study(speed), load_kernel("film_squeeze")
     along, rule = {PRESSURE: one.rows, VOID: one.rows}, quadrature.content_rule(one.order)
@@ -138,7 +138,7 @@ def test_the_frame_does_not_matter() -> None:
     nodes = np.linspace(0.0, 1.0, 9)
     x = np.stack([nodes[:-1], nodes[1:]], axis=1)
     h = 2e-3 * (2.0 - x)
-    one = Strip(x, h, 4, Oil(ETA))
+    one = GapFilm(x, h, 4, FilmOil(ETA))
     results = []
     for w in (0.0, 137.0):
         problem = one.between(problem_of(one, 400.0 + w), np.zeros(2), np.zeros(2))
@@ -161,7 +161,7 @@ def test_motions_repeat_and_stop_at_their_corners() -> None:
     assert trapezoid.speed.next_corner(0.0) == pytest.approx(0.1)
     assert trapezoid.speed.next_corner(0.1) == pytest.approx(0.15)
     with pytest.raises(ValueError, match="rising"):
-        Table.of([(0.0, 1.0), (0.0, 2.0)])
+        TimeTable.of([(0.0, 1.0), (0.0, 2.0)])
 
 
 def test_the_rod_brings_back_what_was_left_on_it() -> None:

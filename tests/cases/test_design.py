@@ -15,11 +15,11 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.sensitivity import design
 from softehl.cases.seal.sensitivity.design import (
     Change,
+    DesignStep,
     Film,
     HeldFilm,
     Lever,
     NoDesignError,
-    Step,
     Target,
     designed,
     settled,
@@ -55,7 +55,7 @@ def held(p: Seal) -> Change:
     return lambda factor: factor ** (1.01 * POWER)
 
 
-def steps(target: Target, solve: Callable[[Seal], FilmState | None]) -> list[Step]:
+def steps(target: Target, solve: Callable[[Seal], FilmState | None]) -> list[DesignStep]:
     def with_mesh(p: Seal) -> Film | None:
         state = solve(p)
         return (state, held(p)) if state else None
@@ -65,7 +65,7 @@ def steps(target: Target, solve: Callable[[Seal], FilmState | None]) -> list[Ste
 
 def test_a_power_law_is_met_in_one_step() -> None:
     found = steps(Target.of("friction -3%"), power_law)
-    assert isinstance(found[0], Step)
+    assert isinstance(found[0], DesignStep)
     assert (found[0].value, found[0].quantity) == (50.0, 5.0)
     assert len(found) == 2
     assert found[1].value == pytest.approx(50.0 * 0.97 ** (1.0 / POWER))
@@ -83,7 +83,7 @@ def test_a_wrong_slope_needs_more_steps_and_a_wrong_sign_never_ends() -> None:
 
 def test_the_last_steps_settle_on_a_mesh_that_is_held() -> None:
     """A first step within one per cent is not the end; a film that is lost there is said."""
-    near, wanted = Step(50.0, 5.03), 5.0
+    near, wanted = DesignStep(50.0, 5.03), 5.0
     found = settled(near, wanted, POWER, lambda factor: factor ** (1.3 * POWER), "missed")
     assert len(found) >= 2
     assert found[-1].quantity == pytest.approx(wanted, rel=1e-4)
@@ -130,9 +130,9 @@ def test_a_measure_of_the_gland_is_designed_by_the_key_that_it_decides(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def found(p: Seal, _target: Target, by: Lever, *_: object) -> list[Step]:
+    def found(p: Seal, _target: Target, by: Lever, *_: object) -> list[DesignStep]:
         first, last = {"housing_diameter": (56.3, 56.4), "groove_width": (3.74, 4.0)}[by.key]
-        return [Step(first, 5.0), Step(last, 4.5)]
+        return [DesignStep(first, 5.0), DesignStep(last, 4.5)]
 
     monkeypatch.setattr(design, "designed", found)
     assert main(["design", "oring", "friction -10%", "--by", measure]) == 0

@@ -12,7 +12,7 @@ from softehl.cases.paper import claims
 from softehl.cases.paper.claims import FINDINGS
 from softehl.cases.paper.figure_spec import Scope
 from softehl.cases.paper.lookup import Query
-from softehl.cases.paper.states import State, Store, setup
+from softehl.cases.paper.states import RequestedState, Store, setup
 from softehl.cases.paper.tables import TABLE_2, unknowns
 from softehl.cases.seal.states.state import FilmRow
 from tests.cases.oring_cases import film_values
@@ -25,10 +25,10 @@ class Made(Query):
 
     told: Told
 
-    def state(self, density: int, p_s: float, speed: float, **others: Any) -> State:
+    def state(self, density: int, p_s: float, speed: float, **others: Any) -> RequestedState:
         columns = {"h_star_um": 1.0, "verdict": "ok", **self.told(density, p_s, speed, **others)}
         row = FilmRow(**film_values(**columns))
-        return State(setup(density, p_s, **others), speed, row)
+        return RequestedState(setup(density, p_s, **others), speed, row)
 
 
 def decided(number: int, told: Told) -> bool | None:

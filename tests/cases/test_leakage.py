@@ -12,7 +12,7 @@ from softehl.cases.harness.case import Run
 from softehl.cases.harness.progress import Display
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.run_record import RunRecord
-from softehl.cases.harness.runner import Reporter
+from softehl.cases.harness.runner import RecordingObserver
 from softehl.cases.oring import CASE
 from softehl.cases.seal.cycle.transient import March, Reading
 from softehl.cases.seal.gland.parameters import Seal
@@ -77,7 +77,7 @@ def test_the_worse_verdict_of_the_two_is_kept() -> None:
 def test_a_run_of_both_strokes_writes_the_table(tmp_path: Path) -> None:
     run = Run(CASE, Seal(speeds=(400.0, 100.0)))
     record = RunRecord(tmp_path / "both", run, "refuse")
-    observer = ObserverAdapter(Reporter(record, Display(), "both"))
+    observer = ObserverAdapter(RecordingObserver(Display(), "both", record=record))
     for speed in (400.0, -400.0, 100.0):
         observer.film_state(film_state(run.parameters, speed))
         assert (record.folder / "leakage.csv").exists() == (speed != 400.0)

@@ -6,7 +6,7 @@ from typing import Unpack
 import numpy as np
 import pytest
 
-from softehl.cases.harness.observer import Step
+from softehl.cases.harness.observer import StepReport
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.report.section import boundary_edges
 from softehl.cases.seal.solve.driver import run
@@ -32,7 +32,7 @@ class Recorder(Silent):
         self.films: list[FilmState] = []
         self.fractions: list[float] = []
 
-    def step(self, **step: Unpack[Step]) -> None:
+    def step(self, **step: Unpack[StepReport]) -> None:
         if step["fraction"] is not None:  # how far a film is from steady is not known
             self.fractions.append(step["fraction"])
 

@@ -16,7 +16,7 @@ import pytest
 from softehl.cases.harness import observer as harness
 from softehl.cases.harness.case import Run
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.observer import Observer
+from softehl.cases.harness.observer import RunObserver
 from softehl.cases.harness.process_pool import completed, processes, solve_side_by_side
 from softehl.cases.harness.sweep import Curve, Task, in_order
 from softehl.cases.oring import CASE
@@ -100,13 +100,13 @@ def alive(pid: int) -> bool:
 # --- strokes side by side -------------------------------------------------------------------------
 
 
-def tell_and_end(parameters: Seal, observer: Observer) -> harness.Outcome:
+def tell_and_end(parameters: Seal, observer: RunObserver) -> harness.RunOutcome:
     for number in range(500):
         observer.stage(str(number), title="", where={})
     return outcome()
 
 
-class Counter(Observer):
+class Counter(RunObserver):
     """Keeps what it is told; may have no room for more."""
 
     def __init__(self, room: int) -> None:

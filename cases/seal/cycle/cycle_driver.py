@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.harness.observer import Observer, Outcome
+from softehl.cases.harness.observer import RunObserver, RunOutcome
 from softehl.cases.seal.correctors.schur_corrector import StaleTangent
 from softehl.cases.seal.cycle.motion import Motion
 from softehl.cases.seal.cycle.transient import (
@@ -75,7 +75,7 @@ Log = Callable[[int, Films, Reading, Any], Any]
 """A row of the number of a cycle, what happened in it, the reading before it, the last row."""
 
 
-def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) -> Outcome:
+def run_cycles(parameters: Any, motion: Motion, observer: RunObserver, log: Log) -> RunOutcome:
     """All cycles of a case; log: makes a row of each.  Failure is in the outcome's status."""
     speed = motion.speed.at(0.0)
     changes = {"speeds": (speed,), "stroke": "out", "error_estimate": False, "tolerance": None}
@@ -101,7 +101,7 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
     return _outcome(p, Status.CONVERGED, "all cycles")
 
 
-def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) -> Branch | None:
+def _cycles(march: March, x: Array, count: int, observer: RunObserver, log: Log) -> Branch | None:
     """All cycles; the one that did not come to its end, if there is one."""
     reading, done, last = march.initialise(x), 0, None
     while (saved := observer.saved_row(float(done + 1))) is not None:
@@ -117,7 +117,7 @@ def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) ->
     return None
 
 
-def _cycle(march: March, number: int, observer: Observer) -> tuple[Films, Branch]:
+def _cycle(march: March, number: int, observer: RunObserver) -> tuple[Films, Branch]:
     """A cycle, from its start or from the last draft of it."""
     films, key, period, saved = Films(), float(number), march.motion.period, time.monotonic()
     # its condensations are its own, so that a run that goes on from here does the same
@@ -161,7 +161,7 @@ def _outline(march: March, instant: Instant) -> dict[str, Array]:
     return {"t_s": np.full(len(z), instant.t), "z_mm": z.copy(), "r_mm": r.copy()}
 
 
-def _outcome(p: Seal, status: Status, message: str) -> Outcome:
+def _outcome(p: Seal, status: Status, message: str) -> RunOutcome:
     system = build_system(p)
     kernels = {b.kernel.name: b.kernel.signature for b in system.problem.assembler.blocks}
-    return Outcome((), status, message, system.counts, kernels)
+    return RunOutcome((), status, message, system.counts, kernels)

@@ -20,14 +20,14 @@ Rows = Sequence[Sequence[float]]
 
 
 @dataclass(frozen=True)
-class Table:
+class TimeTable:
     """Values over time, straight in between, the same again after the last time."""
 
     times: tuple[float, ...]
     values: tuple[float, ...]
 
     @classmethod
-    def of(cls, rows: Rows, key: str = "motion") -> Table:
+    def of(cls, rows: Rows, key: str = "motion") -> TimeTable:
         """From rows (time, value) of a key.  ValueError for times that do not rise from 0."""
         times, values = (tuple(float(v) for v in column) for column in zip(*rows, strict=True))
         if times[0] != 0.0 or len(times) < 2 or not np.all(np.diff(times) > 0.0):
@@ -56,11 +56,11 @@ class Table:
         return max(abs(v) for v in self.values)
 
 
-def _repeated(pressure: Rows | float, period: float) -> Table:
+def _repeated(pressure: Rows | float, period: float) -> TimeTable:
     """A pressure over time from its rows, or one that is the same all the time.  ValueError."""
     if isinstance(pressure, int | float):
-        return Table.of([(0.0, pressure), (period, pressure)])
-    return Table.of(pressure, "pressures")
+        return TimeTable.of([(0.0, pressure), (period, pressure)])
+    return TimeTable.of(pressure, "pressures")
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class Motion:
     corners: whether U or p_s have corners that a step must not pass.
     """
 
-    speed: Table
-    pressure: Table
+    speed: TimeTable
+    pressure: TimeTable
     corners: bool = True
 
     @classmethod
@@ -82,7 +82,7 @@ class Motion:
         """
         t = np.linspace(0.0, 1.0 / frequency, 241)
         speed = pi * frequency * stroke * np.cos(2.0 * pi * frequency * t)
-        return cls(Table(tuple(t), tuple(speed)), _repeated(pressure, 1.0 / frequency), False)
+        return cls(TimeTable(tuple(t), tuple(speed)), _repeated(pressure, 1.0 / frequency), False)
 
     @classmethod
     def trapezoid(
@@ -93,12 +93,12 @@ class Motion:
         U = stroke / (T * 0.5 * (1.0 - ramp))
         fractions = (0.0, 0.25 - ramp / 2, 0.25 + ramp / 2, 0.75 - ramp / 2, 0.75 + ramp / 2, 1.0)
         values = (U, U, -U, -U, U, U)
-        return cls(Table(tuple(T * s for s in fractions), values), _repeated(pressure, T))
+        return cls(TimeTable(tuple(T * s for s in fractions), values), _repeated(pressure, T))
 
     @classmethod
     def of(cls, rows: Rows, pressure: Rows | float) -> Motion:
         """From rows (time, speed).  ValueError."""
-        speed = Table.of(rows)
+        speed = TimeTable.of(rows)
         return cls(speed, _repeated(pressure, speed.period))
 
     @property

@@ -120,7 +120,7 @@ class Lever:
 
 
 @dataclass(frozen=True)
-class Step:
+class DesignStep:
     """A value of the key, and the quantity there by a nonlinear solve.
 
     state: the film; None on a mesh that is held, where only the quantity is known.
@@ -171,14 +171,14 @@ Solve = Callable[[Seal], Film | None]
 """The one film of a case, None where there is none."""
 
 
-def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[Step]:
+def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[DesignStep]:
     """Steps to the value of the key of a lever that meets the target; the last one does.
 
     Raises NoDesignError.
     """
     called, value = p.called(by.key), float(getattr(p, by.key))
     state, _ = _film(p, by, solve)
-    steps = [Step(value, value_of(state, target.quantity), state)]
+    steps = [DesignStep(value, value_of(state, target.quantity), state)]
     target_value = target.factor * steps[0].quantity
     for _ in range(STEPS):
         slope = slope_of(state, target.quantity, by.key)
@@ -193,7 +193,7 @@ def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[Step]:
         message = f"the target needs a {called} that a case cannot have"
         changed_case = changed(p, message, **{by.key: value})
         state, change = _film(changed_case, by, solve)
-        steps.append(Step(value, value_of(state, target.quantity), state))
+        steps.append(DesignStep(value, value_of(state, target.quantity), state))
         if abs(steps[-1].quantity / target_value - 1.0) <= TOLERANCE:
             value_near, goal = by.value_text(changed_case), target.value_text(target_value)
             missed = f"near {value_near} no value gives {goal} on one mesh"
@@ -205,8 +205,8 @@ def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[Step]:
 
 
 def settled(
-    first: Step, target_value: float, slope: float, change: Change, missed: str
-) -> list[Step]:
+    first: DesignStep, target_value: float, slope: float, change: Change, missed: str
+) -> list[DesignStep]:
     """Steps on the mesh of `first`, until the quantity is what was wanted, to `SETTLED`.
 
     slope: d log quantity / d log key. missed: words of the NoDesignError where it is not reached.
@@ -221,7 +221,7 @@ def settled(
         ratio = change(value / first.value)
         if ratio is None:
             raise NoDesignError(f"{missed}: no film is found on the way; {advice}")
-        steps.append(Step(value, first.quantity * ratio))
+        steps.append(DesignStep(value, first.quantity * ratio))
         rise = math.log(steps[-1].quantity / last.quantity) / math.log(value / last.value)
     return steps[1:]
 
@@ -261,7 +261,7 @@ class Design:
     parameters: Seal
     target: Target
     by: Lever
-    steps: Sequence[Step]
+    steps: Sequence[DesignStep]
 
     @property
     def met(self) -> Seal:

@@ -28,7 +28,7 @@ _STEP = 1e-4
 
 
 @dataclass(frozen=True)
-class Edge:
+class FilmEdge:
     """An edge of a film, where it narrows from ten to one and a half times h*.
 
     position: of its outer end on the undeformed arc, mm. opens: whether the film is thicker behind
@@ -53,7 +53,7 @@ class Edge:
         }
 
 
-def edges(case: FilmCase, x: Array, h_star: float) -> list[Edge]:
+def edges(case: FilmCase, x: Array, h_star: float) -> list[FilmEdge]:
     """The edges of a film x (n,), from the sealed side on.
 
     An edge is where ln (h / h*) is carried along: v of d ln (h / h*) = -v (ln h)' ds, by least
@@ -71,11 +71,11 @@ def edges(case: FilmCase, x: Array, h_star: float) -> list[Edge]:
         by_h[nodes] = -slope / (slope @ slope) / h[nodes]
         moved = Quantity(1.0, z=np.zeros(len(h)), h=by_h)
         thickness = float(slope.sum() / (slope @ slope))
-        edges_found.append(Edge(float(s[nodes[0]]), not thin[i + 1], moved, thickness))
+        edges_found.append(FilmEdge(float(s[nodes[0]]), not thin[i + 1], moved, thickness))
     return edges_found
 
 
-def velocities(case: FilmCase, film_edges: Sequence[Edge]) -> list[Array]:
+def velocities(case: FilmCase, film_edges: Sequence[FilmEdge]) -> list[Array]:
     """Of the nodes, (nodes, 2) each, as one edge moves along the arc at speed 1.
 
     The ends of the arc, corners and the other edges rest.
@@ -101,7 +101,7 @@ def shift_rate(case: FilmCase, velocity: Array) -> Inputs:
     return rate_of(lambda by: Inputs.of(shifted(case, velocity, by).problem), step, degree=2)
 
 
-def _parts(case: FilmCase, film_edges: Sequence[Edge]) -> Array:
+def _parts(case: FilmCase, film_edges: Sequence[FilmEdge]) -> Array:
     """Part (arc nodes, edges) that a node has in the movement of an edge."""
     mesh, s = case.system.mesh, case.system.section.positions
     corners = (case.system.section.layout.shape.outline.kinks - mesh.positions[0]) % mesh.length

@@ -32,9 +32,9 @@ from softehl.cases.seal.states.sensitivity_table import differentiable
 from softehl.cases.seal.states.state import (
     ContactState,
     FilmState,
+    LoadStageRecord,
     Observer,
     Outcome,
-    StageRecord,
 )
 from softehl.cases.seal.states.verdict import (
     FilmNumbers,
@@ -188,7 +188,7 @@ def run(
 
 def _outcome(
     system: SealSystem,
-    records: Sequence[StageRecord],
+    records: Sequence[LoadStageRecord],
     states: list[FilmState],
     failures: list[tuple[Status, str]],
     numbers: Mapping[str, float] | None = None,

@@ -14,7 +14,7 @@ from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.solve.correctors import FilmCorrectors
 from softehl.cases.seal.solve.inlet import POWER, InletScales
-from softehl.cases.seal.solve.load_stages import PathDriver, StageLog
+from softehl.cases.seal.solve.load_stages import LoadStageLog, PathDriver
 from softehl.cases.seal.solve.squeeze_film import (
     FIRST,
     SqueezeFilm,
@@ -212,8 +212,8 @@ class FilmSolver:
         end = correctors.steady().solve(more.steady(film.x), film.x)
         return Film(more, end, correctors) if end.converged else film
 
-    def _log(self, squeeze_film: SqueezeFilm) -> StageLog:
+    def _log(self, squeeze_film: SqueezeFilm) -> LoadStageLog:
         """A stage on the way to a film."""
         film, method = squeeze_film.film, "pseudo-transient continuation"
         name = f"film at {film.rod_speed:+g} mm/s"
-        return StageLog(self.driver, name, film.sealed_pressure, film.stroke, method)
+        return LoadStageLog(self.driver, name, film.sealed_pressure, film.stroke, method)

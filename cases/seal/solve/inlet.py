@@ -15,7 +15,7 @@ from math import inf
 from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.states.contacts import Edge, contact_edges
+from softehl.cases.seal.states.contacts import ContactEdge, contact_edges
 from softehl.runtime.arrays import Array
 
 MULTIPLE = 1.75
@@ -56,13 +56,13 @@ def inlet_length(p: Seal, rise: float, speed: float) -> float:
     return float(max((flow * E**2 / rise**1.5) ** 0.4, asperities))
 
 
-def film_thickness(p: Seal, edges: Sequence[Edge], speed: float) -> float:
+def film_thickness(p: Seal, edges: Sequence[ContactEdge], speed: float) -> float:
     """About half of h* (mm) at |U|, K l^(3/2) / E with the l above."""
     flow, E = p.viscosity * speed, 3.0 * p.surface_modulus
     return max((flow**POWER * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
 
 
-def inlet_edge(system: SealSystem, stroke: Stroke, x: Array) -> Edge | None:
+def inlet_edge(system: SealSystem, stroke: Stroke, x: Array) -> ContactEdge | None:
     """The edge of the contact x (n,) where a stroke draws its film in; None without one."""
     edges = contact_edges(system, x)
     edge = edges[0 if stroke == "out" else -1] if edges else None

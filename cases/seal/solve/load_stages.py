@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from softehl.cases.seal.states.state import Observer, StageRecord, operating_point
+from softehl.cases.seal.states.state import LoadStageRecord, Observer, operating_point
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.continuation import Continuation, StepRule
@@ -53,7 +53,7 @@ class StageError(Exception):
 
     load_stage: Stage
     branch: Branch
-    records: Sequence[StageRecord] = ()
+    records: Sequence[LoadStageRecord] = ()
 
     def __str__(self) -> str:
         """Words on how far the stage came, and what may help."""
@@ -76,7 +76,7 @@ class PathDriver:
 
     observer: Observer
     newton: Newton = field(default_factory=lambda: Newton(max_iterations=10))
-    records: list[StageRecord] = field(default_factory=list)
+    records: list[LoadStageRecord] = field(default_factory=list)
 
     def follow(self, load_stage: Stage, x0: Array) -> Array:
         """Unknowns (n,) at the end of a stage that begins with a solution near x0 (n,).
@@ -84,7 +84,9 @@ class PathDriver:
         A wall's friction is that of the way since the step before, in the first one since x0.
         Raises StageError.
         """
-        log = StageLog(self, load_stage.name, load_stage.sealed_pressure, "both", load_stage.method)
+        log = LoadStageLog(
+            self, load_stage.name, load_stage.sealed_pressure, "both", load_stage.method
+        )
         previous = [x0]
 
         def problem_at(parameter: float) -> NonlinearProblem:
@@ -111,7 +113,7 @@ class PathDriver:
 
 
 @dataclass(eq=False)
-class StageLog:
+class LoadStageLog:
     """A stage while it is solved: the observer hears of its steps, and its cost is recorded.
 
     stroke: "both" where a contact state serves both. method: how it is solved.
@@ -149,7 +151,7 @@ class StageLog:
     def end(self, spent: Branch | Solution, ended: str = "") -> None:
         """Record what was spent; ended: words on a stage that failed."""
         self.driver.records.append(
-            StageRecord(
+            LoadStageRecord(
                 name=self.name,
                 seconds=time.perf_counter() - self.start_time,
                 factorisations=spent.factorisations,

@@ -30,7 +30,7 @@ From 1e-5 to 1e-2 the films of an X-ring, a U-cup and a square ring are the same
 
 
 @dataclass(frozen=True)
-class Edge:
+class ContactEdge:
     """An edge of the contact: its place on the arc, mm, and K^2 of its pressure, MPa^2/mm."""
 
     position: float
@@ -73,14 +73,14 @@ def contacts(system: SealSystem, x: Array) -> list[Integers]:
     return groups(h - h.min(), system.rod_multipliers(x) < 0.0, GRAZED)
 
 
-def contact_edges(system: SealSystem, x: Array) -> list[Edge]:
+def contact_edges(system: SealSystem, x: Array) -> list[ContactEdge]:
     """Place and slope of both ends of each contact of the state x along the arc.
 
     The square of the pressure is a straight line there, taken from the second and third node that
     touch; none where fewer than three do. Two edges of each contact, from the sealed side on.
     """
     s, squares = system.section.positions, system.rod_multipliers(x) ** 2
-    flat, edges = system.section.layout.flat, list[Edge]()
+    flat, edges = system.section.layout.flat, list[ContactEdge]()
     for touching in contacts(system, x):
         for out, i in ((-1, touching), (1, touching[::-1])):
             if len(i) >= 3:
@@ -89,7 +89,7 @@ def contact_edges(system: SealSystem, x: Array) -> list[Edge]:
     return edges
 
 
-def _edge(s: Array, squares: Array, outside: float | None) -> Edge:
+def _edge(s: Array, squares: Array, outside: float | None) -> ContactEdge:
     """The edge of a contact whose first three nodes are at s, by the squares of the last two.
 
     outside: place of the node before them, where a flat may end: its corner has a peak, behind
@@ -101,7 +101,7 @@ def _edge(s: Array, squares: Array, outside: float | None) -> Edge:
     if outside is not None and not min(outside, s[0]) <= position <= max(outside, s[0]):
         position = 0.5 * (outside + s[0])
         slope = squares[0] / (s[1] - position)
-    return Edge(float(position), abs(float(slope)))
+    return ContactEdge(float(position), abs(float(slope)))
 
 
 def contact_state(system: SealSystem, x: Array) -> ContactState:

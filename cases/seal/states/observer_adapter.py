@@ -25,14 +25,14 @@ from softehl.runtime.io import number_text, read_columns, read_vtu
 class ObserverAdapter(Observer):
     """Passes on what a run tells to an observer of the harness."""
 
-    to: harness.Observer
+    to: harness.RunObserver
 
     def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
         """See :class:`Observer`."""
         title = f"{name}, p_s = {sealed_pressure:g} MPa, stroke {stroke}"
         self.to.stage(name, title=title, where=operating_point(sealed_pressure, stroke))
 
-    def step(self, **step: Unpack[harness.Step]) -> None:
+    def step(self, **step: Unpack[harness.StepReport]) -> None:
         """See :class:`Observer`."""
         self.to.step(**step)
 

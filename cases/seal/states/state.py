@@ -270,7 +270,7 @@ def operating_point(sealed_pressure: float, stroke: str) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class StageRecord(harness.StageRecord):
+class LoadStageRecord(harness.StageRecord):
     """Cost of one stage of the path; its parameter is a load, or counts the steps of a film."""
 
     @property
@@ -280,7 +280,7 @@ class StageRecord(harness.StageRecord):
 
 
 @dataclass(frozen=True)
-class Outcome(harness.Outcome):
+class Outcome(harness.RunOutcome):
     """Result of a run: its films, and the cost of its stages.
 
     Attributes
@@ -295,7 +295,7 @@ class Outcome(harness.Outcome):
         Number of unknowns, "total" and of parts.
     kernel_signatures : mapping of str to str
         Kernel -> signature of the compiled kernel.
-    stages : tuple of StageRecord
+    stages : tuple of LoadStageRecord
         Cost of each stage.
     solvers : mapping of str to str
         "linear" -> the linear solver in use, "solver" -> the method that was requested.
@@ -304,7 +304,7 @@ class Outcome(harness.Outcome):
     """
 
     states: tuple[FilmState, ...]
-    stages: tuple[StageRecord, ...] = ()
+    stages: tuple[LoadStageRecord, ...] = ()
 
 
 class Observer(Protocol):
@@ -326,7 +326,7 @@ class Observer(Protocol):
         """
         return None
 
-    def step(self, **step: Unpack[harness.Step]) -> None:
+    def step(self, **step: Unpack[harness.StepReport]) -> None:
         """Report a converged step of the path.
 
         Parameters
