@@ -57,7 +57,7 @@ class Curve:
     Attributes
     ----------
     parameters : Parameters
-        Of the class of the case, such as `softehl.Seal`.
+        Of the class of the case.
     folder : Path
         Folder of its files.
     rows : tuple of Row

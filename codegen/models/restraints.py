@@ -45,7 +45,7 @@ def mean_axial() -> Definition:
     """Constraint on the mean axial displacement of the section, with the force as its multiplier.
 
     Potential N / A * integral of (u_z - place) dA, A the area of the section: the force N [N] is
-    work-conjugate to `target`, and acts on the section with the opposite sign.
+    work-conjugate to `place`, and acts on the section with the opposite sign.
     """
     m = Model(
         "mean_axial",

@@ -91,7 +91,7 @@ def test_a_given_derivative_is_the_derivative() -> None:
     p = Page()
     held = p.m.define("held", p.x**2, derivative={p.x: 5 * p.x})
     assert sp.diff(held * p.x, p.x) == held + 5 * p.x**2
-    with pytest.raises(ModelError, match=r"test_names.py:\d+: x is replaced in held, a name"):
+    with pytest.raises(ModelError, match=r"named_symbols.py:\d+: x is replaced in held, a name"):
         (held + 1).subs(p.x, 2)
 
 
@@ -111,7 +111,7 @@ def test_what_cannot_be_followed_is_refused_with_its_line(
 ) -> None:
     p = Page()
     s = p.m.implicit("s", lambda s: s**3 + s - p.lam, start=p.x)
-    with pytest.raises(ModelError, match=rf"test_names.py:\d+: .*{message}|{message}"):
+    with pytest.raises(ModelError, match=rf"test_named_symbols.py:\d+: .*{message}|{message}"):
         p.m.define("made", calculus(p, s))
 
 

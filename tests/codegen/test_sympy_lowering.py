@@ -207,7 +207,7 @@ def test_what_is_never_used_is_named_where_it_was_declared() -> None:
     u = m.unknown("u")
     m.unknown("v")  # the idle unknown
     m.potential(u**2)
-    place = f"test_lower.py:{line_of('# the idle ' + 'unknown')}: the unknown v is never used"
+    place = f"sympy_lowering.py:{line_of('# the idle ' + 'unknown')}: the unknown v is never used"
     with pytest.raises(ModelError, match=place):
         m.finish()
     m = model()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -28,13 +30,19 @@ LONG = (
 
 
 @pytest.fixture
-def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
-    """In an empty folder, with an empty cache and a window of 100 columns."""
+def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Reader]:
+    """In an empty folder, with an empty cache, a window of 100 columns and a log as at first."""
     monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "cache"))
     monkeypatch.setenv("COLUMNS", "100")
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
-    return Reader(DOCS / "models")
+    log = logging.getLogger("softehl")
+    level, handlers = log.level, list(log.handlers)
+    yield Reader(DOCS / "models")
+    log.setLevel(level)
+    for handler in set(log.handlers) - set(handlers):
+        log.removeHandler(handler)
+        handler.close()
 
 
 @pytest.mark.parametrize(
