@@ -47,7 +47,7 @@ def element(name: str, order: int | None = None) -> Element:
     ----------
     name : str
         "hex20", or a shape: "line", "quad" and "hex" (orders 1 to 6), "tri" and "tet" (1 and 2),
-        "wedge" (1).
+        "wedge" and "pyramid" (1).
     order : int, optional
         Order of the shape, element("hex", order=4).
 

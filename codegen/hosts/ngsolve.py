@@ -81,7 +81,7 @@ def _kind(interface: ElementInterface) -> Element:
     for what, present in missing.items():
         if present:
             raise TargetError(f"{interface.name} has {what}, which target ngsolve cannot hold")
-    corners = len(_corners(kind).nodes)
+    corners = len(cells.linear(kind).nodes)
     partial = [f.name for f in interface.nodal if len(f.dofs) not in (corners, len(kind.nodes))]
     if partial:
         raise TargetError(
@@ -89,11 +89,6 @@ def _kind(interface: ElementInterface) -> Element:
             "of target ngsolve are"
         )
     return kind
-
-
-def _corners(kind: Element) -> Element:
-    """The cell of order 1 with the same corners."""
-    return cells.linear(kind)
 
 
 def _parent(kind: Element) -> list[list[float]]:
@@ -162,7 +157,7 @@ def _substitutions(interface: ElementInterface, kind: Element, first: Sample) ->
 
 
 def _of_test(interface: ElementInterface, kind: Element, first: Sample) -> dict[str, Any]:
-    d, corner = interface.definition, _corners(kind)
+    d, corner = interface.definition, cells.linear(kind)
     weights = [[float(N) for N in corner.shape(*node)] for node in kind.nodes]
     image = [tuple(_mirrored([float(c) for c in p])) for p in corner.nodes]
     corners = [tuple(float(c) for c in p) for p in corner.nodes]

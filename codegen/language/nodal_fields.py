@@ -9,16 +9,13 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.elements.cells import ELEMENTS, linear
+from softehl.codegen.elements.cells import linear
 from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.elements.shapes import interpolate
 from softehl.codegen.language.definition import Component, Definition
 from softehl.codegen.language.fields import Fields, FieldTrace
 from softehl.codegen.language.model import Model
-
-CORNERS = {e.name: linear(e).name for e in ELEMENTS.values() if e.order > 1}
-"""The linear element with the corners of one of higher order."""
 
 
 class NodalFields(Fields):
@@ -65,7 +62,7 @@ class NodalFields(Fields):
 
     def _element(self, order: int) -> Element:
         """The cell, or the one of its corners."""
-        return self.cell if order == self.order else ELEMENTS[CORNERS[self.cell.name]]
+        return self.cell if order == self.order else linear(self.cell)
 
     def _shape(self, order: int) -> list[Any]:
         """Shape functions of an order."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.mesh.cells import CELLS, Cell
+from softehl.runtime.mesh.cells import Cell
 
 CORNER = 12
 """Numbers that tell a corner: xi (2), A (2, 2) by columns, eta (2), B (2, 2) by columns."""
@@ -61,7 +61,7 @@ def parents(cell: Cell, corners: Array, queries: Array) -> Array:
     n, m = queries.shape[:2]
     xi = np.tile(cell.nodes[: cell.corners].mean(axis=0), (n * m, 1))
     x, target = np.repeat(corners, m, axis=0), queries.reshape(n * m, 2)
-    flat = _linear(cell)
+    flat = cell.linear
     with np.errstate(all="ignore"):
         for _ in range(1 if cell.corners == 3 else _ITERATIONS):
             error = target - np.einsum("nk,nkc->nc", flat.shape(xi), x)
@@ -81,15 +81,9 @@ def parents(cell: Cell, corners: Array, queries: Array) -> Array:
 def mean_normal(cell: Cell, corners: Array) -> Array:
     """Unit normals (n, 3) in the middle of faces with corners (n, k, 3)."""
     middle = cell.nodes[: cell.corners].mean(axis=0)[None]
-    gradient = np.einsum(
-        "kd,nkc->ncd", _linear(cell).gradient(middle)[0], corners[:, : cell.corners]
-    )
+    gradient = np.einsum("kd,nkc->ncd", cell.linear.gradient(middle)[0], corners[:, : cell.corners])
     across = np.cross(gradient[:, :, 0], gradient[:, :, 1])
     return np.asarray(across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300))
-
-
-def _linear(cell: Cell) -> Cell:
-    return CELLS["tri3" if cell.corners == 3 else "quad4"]
 
 
 def _plane(cell: Cell, corners: Array) -> Array:

@@ -195,7 +195,7 @@ class _PairGeometry:
         )
         N, dN = _shapes(one, xi)
         M, dM = _shapes(other, eta)
-        L, dL = _shapes(_corners(one), xi)
+        L, dL = _shapes(one.linear, xi)
         lam = np.einsum("nk,nkc->nc", L, self.multipliers)
         dlam = np.einsum("nkm,nkc->ncm", dL, self.multipliers)
         for c in range(MULTIPLIERS):
@@ -246,7 +246,7 @@ class _PairGeometry:
 
     def _normal(self) -> _Varied:
         """Mean normal of the face."""
-        flat = _corners(self.pair.one)
+        flat = self.pair.one.linear
         k = len(flat.nodes)
         middle = np.tile(flat.nodes.mean(axis=0), (len(self.x), 1))
         xi = middle, np.zeros((len(middle), 2, self.ndof))
@@ -266,7 +266,7 @@ class _PairGeometry:
         A = motion[:, 2:6].reshape(-1, 2, 2).transpose(0, 2, 1)
         B = motion[:, 8:12].reshape(-1, 2, 2).transpose(0, 2, 1)
         zero = np.zeros((len(motion), 2, self.ndof))
-        flat, far = _corners(self.pair.one), _corners(self.pair.other)
+        flat, far = self.pair.one.linear, self.pair.other.linear
         a, b = len(self.pair.one.nodes), len(far.nodes)
         side_nodes, other_nodes = slice(0, len(flat.nodes)), slice(a, a + b)
         xi, eta = (motion[:, :2], zero), (motion[:, 6:8], zero)
@@ -362,10 +362,6 @@ def _gradients(cell: Cell, at: _Varied) -> _Varied:
         second = cell.gradient(at[0] + h) - cell.gradient(at[0] - h)
         change += second[:, :, :, None] * at[1][:, None, None, d]
     return cell.gradient(at[0]), change
-
-
-def _corners(cell: Cell) -> Cell:
-    return CELLS["tri3" if cell.corners == 3 else "quad4"]
 
 
 def _rule(pair: MortarPairKernel) -> tuple[Array, Array]:

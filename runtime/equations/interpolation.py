@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -81,7 +80,7 @@ def interpolate_unknowns(system: System, points: Array, group: str | None = None
             for block in _at_corners(system, name) if not inside.all() else ():
                 if block.kind == kind:
                     lower = np.flatnonzero(~inside & _among(nodes, block.nodes))
-                    linear = _linear(kind)
+                    linear = CELLS[kind].corner_shape
                     corners = np.zeros_like(weights)
                     corners[:, : linear.shape[1]] = weights @ linear
                     parts.append((lower, corners))
@@ -155,7 +154,7 @@ def at_every_node(system: System, x: Array) -> dict[str, Array]:
     for name, dofs in system.numbering.nodal.items():
         values = nodal_values[name] = np.where(dofs >= 0, x[dofs], np.nan)
         for block in _at_corners(system, name):
-            linear = _linear(block.kind)
+            linear = CELLS[block.kind].corner_shape
             corners = linear.shape[1]
             values[block.nodes[:, corners:]] = values[block.nodes[:, :corners]] @ linear[corners:].T
     return nodal_values
@@ -170,15 +169,3 @@ def _at_corners(system: System, name: str) -> list[Block]:
         if cell and cell.order > 1 and nodes == set(range(cell.corners)):
             blocks.append(block)
     return blocks
-
-
-@cache
-def _linear(kind: str) -> Array:
-    """Values (nodes, corners) at all nodes of a cell by those at its corners."""
-    cell = CELLS[kind]
-    flat = next(
-        c
-        for c in CELLS.values()
-        if c.dimension == cell.dimension and c.corners == cell.corners and c.order == 1
-    )
-    return flat.shape(cell.nodes)

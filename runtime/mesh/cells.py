@@ -77,6 +77,17 @@ class Cell:
         shrunk = {d for d, by in enumerate(self.collapse) if by}
         return tuple(sorted(shrunk.union(*self.collapse)))
 
+    @cached_property
+    def linear(self) -> Cell:
+        """The cell of order 1 with the same corners."""
+        key = (self.dimension, self.corners, 1)
+        return next(c for c in CELLS.values() if (c.dimension, c.corners, c.order) == key)
+
+    @cached_property
+    def corner_shape(self) -> Array:
+        """Shape functions (k, corners) of the linear cell at all nodes."""
+        return self.linear.shape(self.nodes)
+
     def shape(self, at: Array) -> Array:
         """Shape functions (q, k) at parent points (q, dim)."""
         if not self.exponents:
@@ -129,8 +140,7 @@ class Cell:
         sides = []
         for corners in self.sides:
             kind = next(CELLS[f] for f in self.faces if CELLS[f].corners == len(corners))
-            flat = CELLS[_LINEAR[len(corners), kind.dimension]]
-            points = flat.shape(kind.nodes) @ self.nodes[list(corners)]
+            points = kind.corner_shape @ self.nodes[list(corners)]
             distance = np.linalg.norm(self.nodes[None] - points[:, None], axis=2)
             sides.append((kind, tuple(int(k) for k in distance.argmin(axis=1))))
         return tuple(sides)
@@ -293,9 +303,6 @@ def _groups(rows: Sequence[Sequence[int]]) -> Groups:
 
 _APEX = 1e-12
 """Distance from the apex of a pyramid at which its shape functions still have gradients."""
-HIGHEST = 6
-"""Order of shape functions up to which there are lines, quadrilaterals and hexahedra."""
-_LINEAR = {(1, 0): "point1", (2, 1): "line2", (3, 2): "tri3", (4, 2): "quad4"}
 CELLS = _read_cells()
 """Every kind of cell by its name."""
 

@@ -186,7 +186,7 @@ def _boxes(cell: Cell, x: Array, tolerance: float) -> Iterator[_Boxes]:
         np.minimum(low, x[:, corner], out=low)
         np.maximum(high, x[:, corner], out=high)
     if cell.order > 1:
-        straight = np.einsum("kc,ncd->nkd", _by_corners(cell.name), x[:, : cell.corners])
+        straight = np.einsum("kc,ncd->nkd", cell.corner_shape, x[:, : cell.corners])
         bulge = _bulge(cell.name) * np.abs(x - straight).max(axis=1)
         low, high = low - bulge, high + bulge
     low, high = low - tolerance, high + tolerance
@@ -196,18 +196,6 @@ def _boxes(cell: Cell, x: Array, tolerance: float) -> Iterator[_Boxes]:
         rows = np.flatnonzero(size == power)
         tree = cKDTree(middle[rows], compact_nodes=False, balanced_tree=False)
         yield _Boxes(rows, low[rows], high[rows], tree, float(radius[rows].max()))
-
-
-@cache
-def _by_corners(kind: str) -> Array:
-    """Shape functions (k, corners) of the straight cell with the same corners at all nodes."""
-    cell = CELLS[kind]
-    straight = next(
-        other
-        for other in CELLS.values()
-        if (other.dimension, other.corners, other.order) == (cell.dimension, cell.corners, 1)
-    )
-    return straight.shape(cell.nodes)
 
 
 @cache

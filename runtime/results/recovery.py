@@ -91,12 +91,7 @@ def _monomials(at: Array, powers: list[tuple[int, ...]]) -> Array:
 
 def _mirrored(face: Cell) -> Integers:
     """Nodes of a facet in the order of the second cell, where corner k is corner 1 - k."""
-    flat = next(
-        c
-        for c in CELLS.values()
-        if (c.dimension, c.corners, c.order) == (face.dimension, face.corners, 1)
-    )
     turned = face.nodes[[(1 - k) % face.corners for k in range(face.corners)]]
-    mirrored_points = flat.shape(face.nodes) @ turned
+    mirrored_points = face.corner_shape @ turned
     distances = np.linalg.norm(face.nodes[None] - mirrored_points[:, None], axis=2)
     return np.asarray(distances.argmin(axis=1))

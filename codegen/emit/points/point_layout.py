@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from softehl.codegen.derive.output_entries import Entry
-from softehl.codegen.elements.cells import ELEMENTS
+from softehl.codegen.elements.cells import ELEMENTS, linear
 from softehl.codegen.emit.points import basis_tables
 from softehl.codegen.emit.points.basis_tables import Shape
 from softehl.codegen.graph.graph import Input
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Component, Definition, PointForm, Quantity
 from softehl.codegen.language.fields import order_of
-from softehl.codegen.language.nodal_fields import CORNERS
 from softehl.codegen.language.weak_form import rule_of
 
 
@@ -104,8 +103,8 @@ class Layout:
         if order == 0:
             return basis_tables.constant(self.points, self.dimension)
         if order not in self._shapes:
-            corner = order == 1 and self.d.cell in CORNERS
-            cell = ELEMENTS[CORNERS[self.d.cell] if corner else self.d.cell]
+            element = ELEMENTS[self.d.cell]
+            cell = linear(element) if order == 1 else element
             self._shapes[order] = basis_tables.shape(order, cell, self.d.rule)
         return self._shapes[order]
 
