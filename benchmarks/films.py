@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from softehl.cases.cycle import CASE, Cycle
-from softehl.cases.harness.observer import RunObserver, RunOutcome, State
+from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import Silent
@@ -39,7 +39,7 @@ class Cost:
     iterations: int
 
 
-class CycleClock(RunObserver):
+class CycleClock(Observer):
     """Looks at the clock where the cycle begins and where it ends."""
 
     def __init__(self) -> None:
@@ -47,11 +47,11 @@ class CycleClock(RunObserver):
         self.row: Any = None
 
     def stage(self, name: str, **details: Any) -> None:
-        """See :class:`RunObserver`."""
+        """See :class:`Observer`."""
         self.began = time.process_time()
 
     def state(self, state: State) -> None:
-        """See :class:`RunObserver`."""
+        """See :class:`Observer`."""
         self.ended, self.row = time.process_time(), state.row
 
 
@@ -98,7 +98,7 @@ def table(costs: dict[str, Cost]) -> str:
     return "\n".join(lines)
 
 
-def _reached(outcome: RunOutcome) -> RunOutcome:
+def _reached(outcome: Outcome[Any]) -> Outcome[Any]:
     if not outcome.converged:
         raise RuntimeError(outcome.message)
     return outcome

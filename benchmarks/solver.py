@@ -65,7 +65,7 @@ def measure(parameters: Seal) -> dict[str, Any]:
         "stages": [
             {
                 "name": s.name,
-                "stroke": s.stroke,
+                "stroke": s.where["stroke"],
                 "factorisations": s.factorisations,
                 "iterations": s.iterations,
                 "wall": s.seconds,

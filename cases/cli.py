@@ -366,7 +366,6 @@ def design(
     from softehl.cases.harness.runner import DisplayObserver
     from softehl.cases.seal.gland.parameters import Seal
     from softehl.cases.seal.sensitivity.design import design_case, design_lines
-    from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 
     read = read_case(case, SHIPPED, assignments)
     if type(read.parameters) is not Seal:
@@ -376,9 +375,8 @@ def design(
         if not page.parent.is_dir():
             raise BadInput(f"--report {str(page)!r}: there is no folder {str(page.parent)!r}")
     with make_display(read.case.foreword(read.parameters), quiet=False) as display:
-        found = design_case(
-            read.parameters, " ".join(target), key, ObserverAdapter(DisplayObserver(display))
-        )
+        observer = DisplayObserver(display, read.case)
+        found = design_case(read.parameters, " ".join(target), key, observer)
     for line in design_lines(found):
         click.echo(line)
     if page is not None:

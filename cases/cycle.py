@@ -1,6 +1,6 @@
 """The O-ring on a rod that goes to and fro: film, friction and leakage in time, cycle by cycle."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan, pi
 from pathlib import Path
@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from scipy.integrate import trapezoid
 
 from softehl.cases.harness.case import Alarm, Case
-from softehl.cases.harness.observer import RunObserver, RunOutcome, State
+from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.harness.parameters import key
 from softehl.cases.harness.pictures import KINDS, draw_columns, save
 from softehl.cases.harness.report.part import FinishedRun, Part
@@ -21,6 +21,7 @@ from softehl.cases.seal.gland.messages import assumed, foreword, warnings
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import MIXED
 from softehl.cases.seal.report.model_limits import LEFT_OUT, cautions, titled
+from softehl.cases.seal.states.state import stage_label
 from softehl.cases.seal.states.summary import far, leaks
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
@@ -313,7 +314,7 @@ class CycleCase(Case[Cycle, CycleRow]):
         """See :class:`Case`."""
         return f"{piece.cycles} cycles"
 
-    def solve(self, parameters: Cycle, observer: RunObserver, shared: Path | None) -> RunOutcome:
+    def solve(self, parameters: Cycle, observer: Observer, shared: Path | None) -> Outcome[Any]:
         """See :class:`Case`."""
         from softehl.cases.seal.cycle.cycle_driver import run_cycles
 
@@ -323,6 +324,10 @@ class CycleCase(Case[Cycle, CycleRow]):
             return row
 
         return run_cycles(parameters, parameters.path, observer, log)
+
+    def stage_label(self, name: str, marks: Mapping[str, Any]) -> tuple[str, Mapping[str, Any]]:
+        """See :class:`Case`."""
+        return stage_label(name, marks)
 
     def cautions(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""

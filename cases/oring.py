@@ -3,9 +3,10 @@
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from softehl.cases.harness.case import Case
-from softehl.cases.harness.observer import RunObserver, RunOutcome
+from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.pictures import KINDS
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Record
@@ -15,11 +16,8 @@ from softehl.cases.seal.report import paraview, tables
 from softehl.cases.seal.report.model_limits import LEFT_OUT, cautions, titled
 from softehl.cases.seal.states import run_plan
 from softehl.cases.seal.states.leakage import net_leakage
-from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.sensitivity_table import differentiable, resolved
-from softehl.cases.seal.states.state import FilmRow
-from softehl.cases.seal.states.state import Observer as SealObserver
-from softehl.cases.seal.states.state import Outcome as SealOutcome
+from softehl.cases.seal.states.state import FilmRow, FilmState, stage_label
 from softehl.cases.seal.states.summary import run_summary
 
 PICTURES = ("curve", "profiles", "section")
@@ -47,9 +45,15 @@ class ORingCase(Case[Seal, FilmRow]):
     shared = "contacts"
     left_out = LEFT_OUT
 
-    def solve(self, parameters: Seal, observer: RunObserver, shared: Path | None) -> RunOutcome:
+    def solve(
+        self, parameters: Seal, observer: Observer, shared: Path | None
+    ) -> Outcome[FilmState]:
         """See :class:`Case`; runs of one section share their contact states."""
-        return run_oring(parameters, ObserverAdapter(observer), shared)
+        return run_oring(parameters, observer, shared)
+
+    def stage_label(self, name: str, marks: Mapping[str, Any]) -> tuple[str, Mapping[str, Any]]:
+        """See :class:`Case`."""
+        return stage_label(name, marks)
 
     def requested(self, parameters: Seal) -> list[float]:
         """See :class:`Case`."""
@@ -178,8 +182,8 @@ class ORingCase(Case[Seal, FilmRow]):
 
 
 def run_oring(
-    parameters: Seal, observer: SealObserver, contacts: Path | None = None
-) -> SealOutcome:
+    parameters: Seal, observer: Observer, contacts: Path | None = None
+) -> Outcome[FilmState]:
     """Solve a seal and report to the observer, with sensitivities if the parameters say so.
 
     Parameters
@@ -187,7 +191,8 @@ def run_oring(
     parameters : Seal
         The seal.
     observer : Observer
-        Listener of stages, steps and states; `softehl.Silent()` does nothing.
+        Listener of stages, steps and states; `softehl.Silent()` does nothing, and is told of
+        contacts and films by methods of its own.
     contacts : Path, optional
         Folder of contact states to start from and to add to.
 

@@ -25,7 +25,7 @@ from softehl.cases.paper.states import PAPER
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.pictures import write_plots
 from softehl.cases.seal.report.section import Scale, View, draw_view, write_colours
-from softehl.cases.seal.states.observer_adapter import read_profile, read_section
+from softehl.cases.seal.states.state_files import read_profile, read_section
 from softehl.runtime.results.result import Result
 
 SIZE = (2.5, 2.3)

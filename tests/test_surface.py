@@ -30,6 +30,7 @@ INNER = {
     "protocols, which public classes and users' objects satisfy": {
         *("Engine", "Kinematics", "NonlinearProblem"),
     },
+    "records of a run, which a case of one's own makes": {"Cells", "State", "StepReport"},
     "records between a public class and its own methods": {
         *(
             "Affine",
@@ -55,6 +56,7 @@ UNTYPED = {
     "arguments of a kernel by name": {"ElementBlock.given"},
     "its overloads have types": {"page"},
     "parameters and rows of the case's own classes": {"Curve"},
+    "values of a stage, by the case's own names": {"Observer.stage"},
     "arrays of JAX, which need not be installed": {"Operation"},
 }
 """Public names whose annotations hold Any, and why."""

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from softehl.cases.harness.errors import BadInput, one_line
-from softehl.cases.harness.observer import RunObserver, RunOutcome
+from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.parameters import Parameters
 from softehl.cases.harness.row import Record, Row
 
@@ -57,7 +57,7 @@ class Case(Generic[P, R]):
         """Name by which the case is found again: of one that ships, else its source."""
         return self.source or self.name
 
-    def solve(self, parameters: P, observer: RunObserver, shared: Path | None) -> RunOutcome:
+    def solve(self, parameters: P, observer: Observer, shared: Path | None) -> Outcome[Any]:
         """Compute all rows that are asked for; failure is in the outcome's status.
 
         shared: folder of what runs leave for each other, None for none.  Imports what is heavy when
@@ -87,6 +87,10 @@ class Case(Generic[P, R]):
     def piece_name(self, piece: P) -> str:
         """A name that distinguishes a piece from those that run beside it."""
         return str(self.requested(piece))
+
+    def stage_label(self, name: str, marks: Mapping[str, Any]) -> tuple[str, Mapping[str, Any]]:
+        """Title of a stage on the terminal, and its marks in run.json; see `Observer.stage`."""
+        return name, marks
 
     def tables(self, rows: Sequence[R]) -> Mapping[str, Sequence[Record]]:
         """Further tables that follow from the rows: file name without .csv -> records."""
@@ -188,7 +192,7 @@ class Case(Generic[P, R]):
 
 
 AnyCase = Case[Any, Any]
-Solve = Callable[[Any, RunObserver], RunOutcome]
+Solve = Callable[[Any, Observer], Outcome[Any]]
 
 
 def load_case(module: str) -> AnyCase:
@@ -249,6 +253,6 @@ class Run:
     set_keys: frozenset[str] = frozenset()
     pictures: tuple[str, ...] = ("png",)
 
-    def solve(self, parameters: Any, observer: RunObserver) -> RunOutcome:
+    def solve(self, parameters: Any, observer: Observer) -> Outcome[Any]:
         """Run the case with these parameters."""
         return self.case.solve(parameters, observer, self.shared)

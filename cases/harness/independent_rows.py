@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from softehl.cases.harness.case import Case, P, R
-from softehl.cases.harness.observer import RunObserver, RunOutcome, State
+from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.harness.pictures import KINDS, draw_columns
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.io import read_table
@@ -30,13 +30,13 @@ class RowByRow(Case[P, R]):
         """The row and its files from a converged solution."""
         raise NotImplementedError
 
-    def solve(self, parameters: P, observer: RunObserver, shared: Path | None) -> RunOutcome:
+    def solve(self, parameters: P, observer: Observer, shared: Path | None) -> Outcome[State]:
         """See :class:`Case`; a row that does not converge does not end the others."""
         states: list[State] = []
         ended: list[tuple[float, Problem, Solution]] = []
         for key in self.requested(parameters):
             label = self.row.label(key)
-            observer.stage(label, title=label, where={})
+            observer.stage(label)
             problem, solution = self.solution(parameters, key)
             ended.append((key, problem, solution))
             if not solution.converged:
@@ -68,11 +68,11 @@ class RowByRow(Case[P, R]):
 
     def _outcome(
         self, states: Sequence[State], ended: Sequence[tuple[float, Problem, Solution]]
-    ) -> RunOutcome:
+    ) -> Outcome[State]:
         failures = [(key, end) for key, _, end in ended if not end.converged]
         problem = ended[-1][1]
         layout = problem.layout
-        return RunOutcome(
+        return Outcome(
             tuple(states),
             failures[0][1].status if failures else Status.CONVERGED,
             "; ".join(f"{self.row.label(key)}: {end.message}" for key, end in failures)

@@ -1,17 +1,19 @@
 """Messages of a case while it runs, and the outcome that it returns at the end.
 
 A case computes; it neither prints nor writes.  Every result leaves it through a
-:class:`RunObserver`, at the moment it exists, so that a run that is killed keeps what it reached.
+:class:`Observer`, at the moment it exists, so that a run that is killed keeps what it reached.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypedDict, Unpack
+from typing import Any, Generic, Protocol, TypedDict, TypeVar, Unpack
 
 from softehl.cases.harness.file_content import Content
 from softehl.cases.harness.row import Row
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.solution import Status
+
+S = TypeVar("S")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,17 +49,30 @@ class StageRecord:
 
 
 @dataclass(frozen=True)
-class RunOutcome:
-    """States that a run reached; `status` and `message` say why it is not more, if it is not.
+class Outcome(Generic[S]):
+    """Result of a run: its states, and the cost of its stages.
 
-    states: as the observer was told them.  unknowns: their numbers, "total"
-    and those of parts.  kernel_signatures: kernel name -> signature of the compiled kernel.
-    solvers: "linear" -> the linear solver in use, "solver" -> the way that was asked for.
-    numbers: further results of the run as a whole, name with unit -> value.
-    stages: their cost; empty where the observer was told all that is to be recorded.
+    Attributes
+    ----------
+    states : tuple
+        States in the order of the run, of the case's own class.
+    status : Status
+        Whether all states were reached.
+    message : str
+        Reason, if they were not.
+    unknowns : mapping of str to int
+        Number of unknowns, "total" and of parts.
+    kernel_signatures : mapping of str to str
+        Kernel -> signature of the compiled kernel.
+    stages : tuple of StageRecord
+        Cost of each stage; empty where the observer recorded all of it.
+    solvers : mapping of str to str
+        "linear" -> the linear solver in use, "solver" -> the method that was requested.
+    numbers : mapping of str to float
+        Further results, name with unit -> value.
     """
 
-    states: tuple[Any, ...]
+    states: tuple[S, ...]
     status: Status
     message: str
     unknowns: Mapping[str, int] = field(default_factory=dict)
@@ -86,39 +101,90 @@ class StepReport(TypedDict):
     fraction: float | None
 
 
-class RunObserver(Protocol):
-    """The listener a case reports to.  Calls come in order, from one thread."""
+class Observer(Protocol):
+    """Listener of a run; calls come in order, from one thread."""
 
-    def stage(self, name: str, *, title: str, where: Mapping[str, Any]) -> None:
-        """A stage begins.  title: what the user sees.  where: see :class:`StageRecord`."""
+    def stage(self, name: str, **marks: Any) -> None:
+        """Begin a stage.
+
+        Parameters
+        ----------
+        name : str
+            Name of the stage.
+        **marks
+            Further values that identify it; `Case.stage_label` shows them.
+        """
         return None
 
     def step(self, **step: Unpack[StepReport]) -> None:
-        """A step of the path converged."""
+        """Report a converged step of the path.
+
+        Parameters
+        ----------
+        **step
+            `label`, `parameter`, `iterations`, `residuals` and `fraction` of the step; the label is
+            for instance "U [mm/s]" or "load".
+        """
         return None
 
     def state(self, state: State) -> None:
-        """A requested state is there: keep it now."""
+        """Report a requested state, to be saved now.
+
+        Parameters
+        ----------
+        state : State
+            Its row and the contents of its files.
+        """
         return None
 
     def files(self, contents: Mapping[str, Content]) -> None:
-        """Files that belong to no row, by name."""
+        """Report files that belong to no row.
+
+        Parameters
+        ----------
+        contents : mapping of str to Content
+            File name -> columns, or a section.
+        """
         return None
 
     def saved_row(self, key: float) -> tuple[Row, Sequence[Mapping[str, Array]]] | None:
-        """A row that an earlier run left here, and its tables; None where there is none.
+        """Return a row of an earlier run in this folder; only for a run in this process.
 
-        Of a run in this process only.
+        Parameters
+        ----------
+        key : float
+            Key of the row.
+
+        Returns
+        -------
+        tuple of Row and sequence of mappings, or None
+            The row and its tables, column -> array (n,); None if there is none.
         """
         return None
 
     def draft(self, key: float, arrays: Mapping[str, Array]) -> None:
-        """Keep the unfinished part of a row that takes long, for a run that goes on from here.
+        """Keep the unfinished part of a long row for a resumed run; only in this process.
 
-        Of a run in this process only, like `drafted`.
+        Parameters
+        ----------
+        key : float
+            Key of the row.
+        arrays : mapping of str to array
+            Its data.
         """
         return None
 
     def drafted(self, key: float) -> Mapping[str, Array] | None:
-        """The last draft that an earlier run left of a row; None where there is none."""
+        """Return the last draft of a row that an earlier run left.
+
+        Parameters
+        ----------
+        key : float
+            Key of the row.
+
+        Returns
+        -------
+        mapping of str to array, or None
+            The draft; None if there is none.
+        """
         return None

@@ -21,7 +21,7 @@ from typing import Any, TypeVar, Unpack
 
 from softehl.cases.harness.case import Solve
 from softehl.cases.harness.file_content import Content
-from softehl.cases.harness.observer import RunObserver, RunOutcome, State, StepReport
+from softehl.cases.harness.observer import Observer, Outcome, State, StepReport
 from softehl.runtime.solve.solution import Status
 
 T = TypeVar("T")
@@ -89,10 +89,10 @@ class _Worker:
     sender: our copy of the other side's end, until the first call shows that it has its own.
     """
 
-    observer: RunObserver
+    observer: Observer
     receiver: "Connection[Any, Any]"
     sender: "Connection[Any, Any]"
-    future: Future[RunOutcome]
+    future: Future[Outcome[Any]]
 
     def listen(self) -> None:
         """Make the next call."""
@@ -102,8 +102,8 @@ class _Worker:
 
 
 def solve_side_by_side(
-    solve: Solve, pieces: Sequence[Any], observers: Sequence[RunObserver]
-) -> list[RunOutcome]:
+    solve: Solve, pieces: Sequence[Any], observers: Sequence[Observer]
+) -> list[Outcome[Any]]:
     """Run each parameter set in its own process; the outcomes in the order of `pieces`.
 
     The observers are called in this process.  solve must cross by pickle.  A process that the
@@ -123,11 +123,11 @@ def solve_side_by_side(
         return _collect(workers)
 
 
-def _outcome(worker: _Worker) -> RunOutcome:
+def _outcome(worker: _Worker) -> Outcome[Any]:
     try:
         return worker.future.result()
     except BrokenProcessPool:
-        return RunOutcome(
+        return Outcome(
             states=(),
             status=Status.KILLED,
             message="its process was ended from outside (killed, or out of memory)",
@@ -136,7 +136,7 @@ def _outcome(worker: _Worker) -> RunOutcome:
         )
 
 
-def _collect(workers: Sequence[_Worker]) -> list[RunOutcome]:
+def _collect(workers: Sequence[_Worker]) -> list[Outcome[Any]]:
     """Make the calls that arrive, until every worker has its outcome."""
     speaking = {worker.receiver: worker for worker in workers}
     while True:
@@ -160,18 +160,18 @@ def _error(worker: _Worker) -> BaseException | None:
     return worker.future.exception()
 
 
-def _work(solve: Solve, piece: Any, sender: "Connection[Any, Any]") -> RunOutcome:
+def _work(solve: Solve, piece: Any, sender: "Connection[Any, Any]") -> Outcome[Any]:
     return solve(piece, PipeObserver(sender))
 
 
 @dataclass(frozen=True)
-class PipeObserver(RunObserver):
+class PipeObserver(Observer):
     """The observer inside a process of its own: sends each call to the other side."""
 
     sender: "Connection[Any, Any]"
 
-    def stage(self, name: str, **details: Any) -> None:
-        self.sender.send(("stage", (name,), details))
+    def stage(self, name: str, **marks: Any) -> None:
+        self.sender.send(("stage", (name,), marks))
 
     def step(self, **step: Unpack[StepReport]) -> None:
         self.sender.send(("step", (), dict(step)))

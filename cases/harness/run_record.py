@@ -21,7 +21,7 @@ from softehl.cases.harness.case import AnyCase, Run
 from softehl.cases.harness.curve_folder import CurveFolder
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.file_content import Content, file_digest, write_content
-from softehl.cases.harness.observer import RunOutcome, StageRecord, State
+from softehl.cases.harness.observer import Outcome, StageRecord, State
 from softehl.cases.harness.resume import (
     Earlier,
     Existing,
@@ -178,7 +178,7 @@ class RunRecord:
             return None
         return arrays
 
-    def set_outcomes(self, outcomes: Sequence[RunOutcome]) -> None:
+    def set_outcomes(self, outcomes: Sequence[Outcome[Any]]) -> None:
         """Record what only the end of a run shows: size, kernels and cost of each stage."""
         for outcome in outcomes:
             if not outcome.kernel_signatures:

@@ -9,10 +9,10 @@ from typing import Any, Unpack
 import click
 
 from softehl.cases.harness import table
-from softehl.cases.harness.case import Alarm, Run
+from softehl.cases.harness.case import Alarm, AnyCase, Run
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.file_content import Content
-from softehl.cases.harness.observer import RunObserver, RunOutcome, State, StepReport
+from softehl.cases.harness.observer import Observer, Outcome, State, StepReport
 from softehl.cases.harness.process_pool import solve_side_by_side
 from softehl.cases.harness.progress import Display, make_display
 from softehl.cases.harness.resume import Existing
@@ -51,7 +51,7 @@ def compute(record: RunRecord, *, jobs: int, display: Display) -> list[str]:
 
     Raises BadInput like :func:`run_case`.
     """
-    run, outcomes = record.run, list[RunOutcome]()
+    run, outcomes = record.run, list[Outcome[Any]]()
     with _recorded(record):
         for parameters in run.case.rounds(run.parameters):
             pieces = run.case.pieces(parameters, record.curve.rows, jobs)
@@ -62,10 +62,11 @@ def compute(record: RunRecord, *, jobs: int, display: Display) -> list[str]:
 
 def _solve(
     run: Run, pieces: Sequence[Any], record: RunRecord, display: Display, jobs: int
-) -> list[RunOutcome]:
+) -> list[Outcome[Any]]:
     """Run parameter sets one after the other or, with jobs > 1, side by side."""
     reporters = [
-        RecordingObserver(display, run.case.piece_name(piece), record=record) for piece in pieces
+        RecordingObserver(display, run.case, run.case.piece_name(piece), record=record)
+        for piece in pieces
     ]
     if jobs > 1 and len(pieces) > 1:
         outcomes = solve_side_by_side(run.solve, pieces, reporters)
@@ -79,26 +80,28 @@ def _solve(
 
 
 @dataclass
-class DisplayObserver(RunObserver):
+class DisplayObserver(Observer):
     """Shows the stages, steps and states of a worker, and records nothing.
 
     worker: its name, empty where it is the only one.
     """
 
     display: Display
+    case: AnyCase
     worker: str = ""
 
-    def stage(self, name: str, *, title: str, where: Mapping[str, Any]) -> None:
-        """See :class:`RunObserver`."""
+    def stage(self, name: str, **marks: Any) -> None:
+        """See :class:`Observer`."""
+        title, _ = self.case.stage_label(name, marks)
         self.display.begin_stage(self.worker, title)
 
     def step(self, **step: Unpack[StepReport]) -> None:
-        """See :class:`RunObserver`."""
+        """See :class:`Observer`."""
         text = f"{step['label']} = {step['parameter']:.4g}"
         self.display.step(self.worker, text, step["fraction"])
 
     def state(self, state: State) -> None:
-        """See :class:`RunObserver`."""
+        """See :class:`Observer`."""
         self.display.state(state.row)
 
 
@@ -109,31 +112,32 @@ class RecordingObserver(DisplayObserver):
     record: RunRecord
     log: StageLog | None = None
 
-    def stage(self, name: str, *, title: str, where: Mapping[str, Any]) -> None:
-        """See :class:`RunObserver`."""
+    def stage(self, name: str, **marks: Any) -> None:
+        """See :class:`Observer`."""
+        _, where = self.case.stage_label(name, marks)
         with writing(self.record.folder):
             self.log = self.record.open_stage(name, where)
-        super().stage(name, title=title, where=where)
+        super().stage(name, **marks)
 
     def step(self, **step: Unpack[StepReport]) -> None:
-        """See :class:`RunObserver`."""
+        """See :class:`Observer`."""
         if self.log is not None:
             self.log.step(step["parameter"], step["iterations"], step["residuals"])
         super().step(**step)
 
     def state(self, state: State) -> None:
-        """See :class:`RunObserver`."""
+        """See :class:`Observer`."""
         with writing(self.record.folder):
             self.record.state(state)
         super().state(state)
 
     def files(self, contents: Mapping[str, Content]) -> None:
-        """See :class:`RunObserver`."""
+        """See :class:`Observer`."""
         with writing(self.record.folder):
             self.record.files(contents)
 
     def saved_row(self, key: float) -> tuple[Row, Sequence[Mapping[str, Array]]] | None:
-        """See :class:`RunObserver`."""
+        """See :class:`Observer`."""
         for row in self.record.curve.rows:
             if row.key == key:
                 paths = [self.record.folder / name for name in row.file_names()]
@@ -141,12 +145,12 @@ class RecordingObserver(DisplayObserver):
         return None
 
     def draft(self, key: float, arrays: Mapping[str, Array]) -> None:
-        """See :class:`RunObserver`."""
+        """See :class:`Observer`."""
         with writing(self.record.folder):
             self.record.draft(key, arrays)
 
     def drafted(self, key: float) -> Mapping[str, Array] | None:
-        """See :class:`RunObserver`."""
+        """See :class:`Observer`."""
         return self.record.drafted(key)
 
 
@@ -178,7 +182,7 @@ def writing(folder: Path) -> Iterator[None]:
         raise BadInput(f"cannot write {where!r}: {error.strerror or error}") from None
 
 
-def _conclude(record: RunRecord, outcomes: Sequence[RunOutcome]) -> list[str]:
+def _conclude(record: RunRecord, outcomes: Sequence[Outcome[Any]]) -> list[str]:
     """Complete the record; return what is missing."""
     record.begin()
     record.set_outcomes(outcomes)
@@ -216,7 +220,7 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
     return NOT_CONVERGED
 
 
-def _failures(outcomes: Sequence[RunOutcome]) -> list[str]:
+def _failures(outcomes: Sequence[Outcome[Any]]) -> list[str]:
     """Messages of the runs that stopped early."""
     return [
         f"{outcome.status.value}: {' '.join(outcome.message.split())}"

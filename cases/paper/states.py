@@ -15,9 +15,9 @@ from softehl.cases.harness.row import OK
 from softehl.cases.harness.sweep import differences
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.states.observer_adapter import read_profile
 from softehl.cases.seal.states.run_plan import SIGNS
 from softehl.cases.seal.states.state import COLLAPSED, FilmRow, Profile
+from softehl.cases.seal.states.state_files import read_profile
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import number_text, read_columns, read_json
 

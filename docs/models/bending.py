@@ -5,7 +5,7 @@ from pathlib import Path
 
 from softehl import Mesh, Parameters, Status, Study
 from softehl.cases.harness.case import Case
-from softehl.cases.harness.observer import RunObserver, RunOutcome, State
+from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.harness.parameters import Nonzeros, key
 from softehl.cases.harness.row import OK, Row, column
 
@@ -27,7 +27,7 @@ class Bending(Case[Beam, TipRow]):
     parameters, row = Beam, TipRow
     list_key, selection = "forces", ("forces",)
 
-    def solve(self, parameters: Beam, observer: RunObserver, shared: Path | None) -> RunOutcome:
+    def solve(self, parameters: Beam, observer: Observer, shared: Path | None) -> Outcome[State]:
         states = []
         for force in parameters.forces:
             study = Study(Mesh.rectangle(10, 1, cells=(20, 2), order=2))
@@ -37,4 +37,4 @@ class Bending(Case[Beam, TipRow]):
             tip = float(study.solve().at((10, 0.5))["u_y"])
             states.append(State(TipRow(force_N=force, tip_mm=tip)))
             observer.state(states[-1])
-        return RunOutcome(tuple(states), Status.CONVERGED, "all forces")
+        return Outcome(tuple(states), Status.CONVERGED, "all forces")

@@ -16,6 +16,7 @@ from softehl.errors import SoftehlError, UnknownNameError
 if TYPE_CHECKING:
     from softehl.__main__ import main
     from softehl.cases.harness.errors import BadInput
+    from softehl.cases.harness.observer import Observer, Outcome
     from softehl.cases.harness.parameters import Parameters
     from softehl.cases.harness.process_pool import processes
     from softehl.cases.harness.sweep import Curve
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from softehl.cases.seal.states.state import (
         ContactState,
         FilmState,
-        Observer,
-        Outcome,
         Profile,
         Silent,
     )
@@ -148,9 +147,9 @@ _PUBLIC = {
     "NotConverged": "softehl.runtime.solve.solution",
     "ORing": "softehl.cases.seal.gland.parameters",
     "Objective": "softehl.runtime.fit.objective",
-    "Observer": "softehl.cases.seal.states.state",
+    "Observer": "softehl.cases.harness.observer",
     "Operation": "softehl.runtime.fit.jax_operation",
-    "Outcome": "softehl.cases.seal.states.state",
+    "Outcome": "softehl.cases.harness.observer",
     "Parameters": "softehl.cases.harness.parameters",
     "Petsc": "softehl.runtime.parallel.petsc",
     "Point": "softehl.runtime.solve.solution",

@@ -92,9 +92,9 @@ class Watch(Silent):
         self.stages: list[str] = []
         self.states: list[FilmState] = []
 
-    def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
+    def stage(self, name: str, **marks: Any) -> None:
         """See `Observer`."""
-        self.stages.append(f"{name}, {stroke}")
+        self.stages.append(f"{name}, {marks['stroke']}")
 
     def film_state(self, state: FilmState) -> None:
         """See `Observer`."""

@@ -17,7 +17,7 @@ import pytest
 
 import softehl
 from softehl.cases import oring
-from softehl.cases.harness import observer as harness
+from softehl.cases.harness.observer import Observer, Outcome, StageRecord
 from softehl.cases.harness.resume import kernel_signatures
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.run_record import RunRecord
@@ -25,18 +25,15 @@ from softehl.cases.harness.runner import NOT_CONVERGED
 from softehl.cases.oring import PICTURES, ORingCase
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report import pictures
-from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.state import (
     COLLAPSED,
     ContactState,
     FilmState,
-    LoadStageRecord,
-    Observer,
-    Outcome,
     Profile,
     Section,
     operating_point,
 )
+from softehl.cases.seal.states.state_files import report_contact, report_film
 from softehl.runtime.kernels.kernel import MissingKernelsError
 from softehl.runtime.kernels.shared_library import library_of
 from softehl.runtime.mesh.mesh import MeshError
@@ -65,7 +62,7 @@ FILES = {
 USED = {"film": kernel_signatures()["film"]}
 
 
-Solve = Callable[[Seal, Observer], harness.RunOutcome]
+Solve = Callable[[Seal, Observer], Outcome[FilmState]]
 
 
 class Fake(ORingCase):
@@ -75,9 +72,9 @@ class Fake(ORingCase):
         self.solver = solver
 
     def solve(
-        self, parameters: Seal, observer: harness.RunObserver, shared: Path | None
-    ) -> harness.RunOutcome:
-        return self.solver(parameters, ObserverAdapter(observer))
+        self, parameters: Seal, observer: Observer, shared: Path | None
+    ) -> Outcome[FilmState]:
+        return self.solver(parameters, observer)
 
 
 # --- a case that answers at once ---------------------------------------------------------------
@@ -118,13 +115,13 @@ def film_state(parameters: Seal, speed: float, verdict: str = OK) -> FilmState:
     )
 
 
-def solve(parameters: Seal, observer: Observer) -> Outcome:
+def solve(parameters: Seal, observer: Observer) -> Outcome[FilmState]:
     """Every requested state, fast ones first."""
     p = parameters.sealed_pressure
     x = np.array([-1.0, 0.0, 1.0])
     observer.stage("contact", sealed_pressure=p, stroke=parameters.stroke, steps=1)
     observer.step(label="load", parameter=1.0, iterations=3, residuals=(1.0, 1e-12), fraction=1.0)
-    observer.contact_state(ContactState(p, x, 4.1 - x**2, section()))
+    report_contact(observer, ContactState(p, x, 4.1 - x**2, section()))
     strokes = {"out": [1.0], "in": [-1.0], "both": [1.0, -1.0]}[parameters.stroke]
     states = []
     for sign in strokes:
@@ -132,62 +129,64 @@ def solve(parameters: Seal, observer: Observer) -> Outcome:
         for speed in sorted(parameters.speeds, reverse=True):
             state = film_state(parameters, sign * speed)
             observer.step(label="U", parameter=speed, iterations=4, residuals=(), fraction=None)
-            observer.film_state(state)
+            report_film(observer, state)
             states.append(state)
     return outcome(*states)
 
 
-def outcome(*states: FilmState, status: Status = Status.CONVERGED, message: str = "") -> Outcome:
-    stage = LoadStageRecord(
+def outcome(
+    *states: FilmState, status: Status = Status.CONVERGED, message: str = ""
+) -> Outcome[FilmState]:
+    stage = StageRecord(
         "contact", 0.5, 4, 3, ((1.0, 1e-2, 1e-5),), (1.0,), operating_point(1.0, "out")
     )
     unknowns = {"total": 1234, "pressure": 109}
     return Outcome(states, status, message, unknowns, USED, (stage,))
 
 
-def solve_roughly(parameters: Seal, observer: Observer) -> Outcome:
+def solve_roughly(parameters: Seal, observer: Observer) -> Outcome[FilmState]:
     """Every requested state, with an error that falls with the density and rises with 1 / U."""
     states = []
     for sign in {"out": [1.0], "in": [-1.0], "both": [1.0, -1.0]}[parameters.stroke]:
         for speed in parameters.speeds:
             error = -400.0 / speed / parameters.density**2
             state = replace(film_state(parameters, sign * speed), h_star_error_percent=error)
-            observer.film_state(state)
+            report_film(observer, state)
             states.append(state)
     return outcome(*states)
 
 
-def solve_and_stop(parameters: Seal, observer: Observer) -> Outcome:
+def solve_and_stop(parameters: Seal, observer: Observer) -> Outcome[FilmState]:
     """One state, then no convergence."""
     state = film_state(parameters, max(parameters.speeds))
-    observer.film_state(state)
+    report_film(observer, state)
     return outcome(state, status=Status.STEP_TOO_SMALL, message="stopped at\nU = 250 mm/s")
 
 
-def solve_and_collapse(parameters: Seal, observer: Observer) -> Outcome:
+def solve_and_collapse(parameters: Seal, observer: Observer) -> Outcome[FilmState]:
     """A good state and a collapsed one."""
     fast, slow = max(parameters.speeds), min(parameters.speeds)
     states = [film_state(parameters, fast), film_state(parameters, slow, COLLAPSED)]
     for state in states:
-        observer.film_state(state)
+        report_film(observer, state)
     return outcome(*states)
 
 
-def solve_and_break(parameters: Seal, observer: Observer) -> Outcome:
+def solve_and_break(parameters: Seal, observer: Observer) -> Outcome[FilmState]:
     """One state, then an error in the program."""
     observer.stage("speed", sealed_pressure=1.0, stroke="out", steps=None)
     observer.step(label="U", parameter=400.0, iterations=4, residuals=(1.0,), fraction=None)
-    observer.film_state(film_state(parameters, max(parameters.speeds)))
+    report_film(observer, film_state(parameters, max(parameters.speeds)))
     raise ArithmeticError("broken")
 
 
-def solve_and_die(parameters: Seal, observer: Observer) -> Outcome:
+def solve_and_die(parameters: Seal, observer: Observer) -> Outcome[FilmState]:
     """One state, then the end of the process without any clean-up."""
-    observer.film_state(film_state(parameters, max(parameters.speeds)))
+    report_film(observer, film_state(parameters, max(parameters.speeds)))
     os._exit(9)
 
 
-def solve_without_kernels(parameters: Seal, observer: Observer) -> Outcome:
+def solve_without_kernels(parameters: Seal, observer: Observer) -> Outcome[FilmState]:
     raise MissingKernelsError("no compiled kernels;\nrun `python -m softehl.codegen.tools.build`")
 
 
@@ -401,8 +400,8 @@ def test_not_converged(here: Path, invoke: Invoke) -> None:
 
 
 def test_a_shape_that_cannot_be_meshed_is_one_line(here: Path, invoke: Invoke) -> None:
-    def solve_without_mesh(parameters: Seal, observer: Observer) -> Outcome:
-        observer.film_state(film_state(parameters, max(parameters.speeds)))
+    def solve_without_mesh(parameters: Seal, observer: Observer) -> Outcome[FilmState]:
+        report_film(observer, film_state(parameters, max(parameters.speeds)))
         raise MeshError("no sound mesh of sq at density 1; use rounder corners")
 
     code, _, err = invoke("run", "oring", *FAST, solver=solve_without_mesh)
@@ -463,7 +462,7 @@ def test_a_killed_run_is_resumed(here: Path, invoke: Invoke) -> None:
     assert run_json(folder)["status"] == "running"
     asked: list[tuple[str, tuple[float, ...]]] = []
 
-    def counting(parameters: Seal, observer: Observer) -> Outcome:
+    def counting(parameters: Seal, observer: Observer) -> Outcome[FilmState]:
         asked.append((parameters.stroke, parameters.speeds))
         return solve(parameters, observer)
 

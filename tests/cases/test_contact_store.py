@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from softehl.cases.harness.observer import Outcome
 from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections.section_keys import dimensions
@@ -23,7 +24,7 @@ from softehl.cases.seal.solve.contact_meshes import (
 from softehl.cases.seal.solve.contact_stages import contact_problem
 from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.solve.load_stages import PathDriver
-from softehl.cases.seal.states.state import Outcome, Silent
+from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.runtime.io import read_arrays, write_arrays
 
 Damage = Callable[[Path, np.random.Generator], None]
@@ -116,26 +117,26 @@ def case(**changes: Any) -> Seal:
     return Seal(**{**scheme, **given, **changes})
 
 
-def cost(outcome: Outcome) -> int:
+def cost(outcome: Outcome[FilmState]) -> int:
     """Factorisations of the contact."""
-    return sum(s.factorisations or 0 for s in outcome.stages if s.stroke == "both")
+    return sum(s.factorisations or 0 for s in outcome.stages if s.where["stroke"] == "both")
 
 
 @pytest.fixture(scope="module")
-def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome]:
+def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome[FilmState]]:
     """A folder with the one contact state of `case()`, and the run that left it."""
     folder = tmp_path_factory.mktemp("solved")
     return folder, run(case(), Silent(), contacts=folder)
 
 
 @pytest.fixture
-def contacts(solved: tuple[Path, Outcome], tmp_path: Path) -> Path:
+def contacts(solved: tuple[Path, Outcome[FilmState]], tmp_path: Path) -> Path:
     """A copy of that folder."""
     return shutil.copytree(solved[0], tmp_path / "contacts")
 
 
 @cache
-def plain(**changes: Any) -> Outcome:
+def plain(**changes: Any) -> Outcome[FilmState]:
     return run(case(**changes), Silent())
 
 
@@ -172,7 +173,9 @@ def test_every_parameter_either_matters_or_does_not() -> None:
     assert len({key, *keys, *rubbers}) == 1 + len(CHANGED) + len(rubbers)
 
 
-def test_a_second_curve_has_no_contact_path(solved: tuple[Path, Outcome], contacts: Path) -> None:
+def test_a_second_curve_has_no_contact_path(
+    solved: tuple[Path, Outcome[FilmState]], contacts: Path
+) -> None:
     first = solved[1]
     assert cost(first) > 20
     second = run(case(stroke="both"), Silent(), contacts=contacts)

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import pytest
 
+from softehl.cases.harness.observer import Outcome
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import DENSITIES
@@ -20,11 +21,7 @@ from softehl.cases.seal.states.estimate import (
     finer_density,
     reservation,
 )
-from softehl.cases.seal.states.state import (
-    UNCERTAIN,
-    Outcome,
-    Silent,
-)
+from softehl.cases.seal.states.state import UNCERTAIN, FilmState, Silent
 from softehl.cases.seal.states.verdict import FilmNumbers
 from tests.cases.oring_cases import oring
 
@@ -53,7 +50,7 @@ def estimated(h_star: float, other: float, ratio: float) -> Estimate:
 
 
 @pytest.fixture(scope="module")
-def curve() -> Outcome:
+def curve() -> Outcome[FilmState]:
     return run(_case(), Silent())
 
 
@@ -94,7 +91,7 @@ def test_an_error_of_another_order_is_not() -> None:
     assert abs(found.h_star) > 1.5 * error
 
 
-def test_the_estimate_is_within_a_factor_of_two(curve: Outcome) -> None:
+def test_the_estimate_is_within_a_factor_of_two(curve: Outcome[FilmState]) -> None:
     for state in curve.states:
         error = 100.0 * (state.h_star_um / CONVERGED[state.rod_speed] - 1.0)
         assert 0.5 < state.h_star_error_percent / error < 2.0
@@ -102,12 +99,12 @@ def test_the_estimate_is_within_a_factor_of_two(curve: Outcome) -> None:
         assert abs(state.rod_friction_error_percent) < 3.0 * abs(state.h_star_error_percent)
 
 
-def test_the_films_of_the_coarser_mesh_are_no_results(curve: Outcome) -> None:
+def test_the_films_of_the_coarser_mesh_are_no_results(curve: Outcome[FilmState]) -> None:
     assert [state.rod_speed for state in curve.states] == list(CONVERGED)
     assert {state.density for state in curve.states} == {2}
 
 
-def test_without_an_estimate_only_the_way_is_another(curve: Outcome) -> None:
+def test_without_an_estimate_only_the_way_is_another(curve: Outcome[FilmState]) -> None:
     plain = run(_case(error_estimate=False), Silent())
     assert [s.h_star_um for s in plain.states] == pytest.approx(
         [s.h_star_um for s in curve.states], rel=1e-9

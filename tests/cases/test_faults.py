@@ -18,11 +18,12 @@ import pytest
 import softehl
 from softehl.cases import oring
 from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.observer import Observer
 from softehl.cases.harness.report.page import read_finished
 from softehl.cases.harness.run_record import table_digests
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.states.state import Observer
+from softehl.cases.seal.states.state_files import report_film
 from softehl.cases.shipped import SHIPPED
 from softehl.folder_lock import FolderLock
 from tests.cases.test_cli import FAST, Fake, film_state, solve
@@ -238,7 +239,7 @@ def run_slowly(folder: str) -> None:
     """A state, then a long silence."""
 
     def slowly(parameters: Seal, observer: Observer) -> Any:
-        observer.film_state(film_state(parameters, max(parameters.speeds)))
+        report_film(observer, film_state(parameters, max(parameters.speeds)))
         Path(folder).with_name("there").touch()
         time.sleep(300)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from softehl.cases.harness.observer import Outcome
 from softehl.cases.seal.correctors.layer_split import Layered
 from softehl.cases.seal.correctors.schur_corrector import SchurCorrector
 from softehl.cases.seal.equations.system import build_system
@@ -15,7 +16,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve import correctors
 from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.solve.squeeze_film import film_layer, film_loads
-from softehl.cases.seal.states.state import Outcome
+from softehl.cases.seal.states.state import FilmState
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.solution import Solution, Status
 from tests.cases.oring_cases import oring
@@ -25,7 +26,9 @@ SPEEDS = (1600.0, 400.0)
 
 
 @cache
-def solved(solver: str, sealed_pressure: float, linear: str = "auto", density: int = 2) -> Outcome:
+def solved(
+    solver: str, sealed_pressure: float, linear: str = "auto", density: int = 2
+) -> Outcome[FilmState]:
     return run(
         oring(
             density=density,
@@ -59,7 +62,7 @@ def test_the_cost_of_the_fast_route() -> None:
     fast, reference = (solved(s, 1.0, density=1).stages for s in ("auto", "monolithic"))
     for stroke in ("out", "in"):
         few, many = (
-            sum(s.factorisations or 0 for s in stages if s.stroke == stroke)
+            sum(s.factorisations or 0 for s in stages if s.where["stroke"] == stroke)
             for stages in (fast, reference)
         )
         assert few <= 5
@@ -103,7 +106,7 @@ def test_where_it_gives_up_newton_goes_on(
     assert outcome.converged, outcome.message
     assert [s.rod_speed for s in outcome.states] == list(SPEEDS)  # each of them once
     fast, films = (
-        [s for s in stages if s.stroke == "out"]
+        [s for s in stages if s.where["stroke"] == "out"]
         for stages in (solved("auto", 1.0, density=1).stages, outcome.stages)
     )
     # Newton's method factorises in every iteration

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from softehl.cases.harness.observer import Outcome
 from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
 from softehl.cases.seal.equations.system import build_system
@@ -20,14 +21,14 @@ from softehl.cases.seal.states.state import (
     COLLAPSED,
     UNCERTAIN,
     UNDER_RESOLVED,
-    Outcome,
+    FilmState,
     Silent,
 )
 from softehl.runtime.solve.solution import Branch, Status
 from tests.cases.gland_matrix import drawn
 
 
-def solved(**changes: Any) -> Outcome:
+def solved(**changes: Any) -> Outcome[FilmState]:
     given = {"ring": "AS568-210", "rod": 19.0, "speeds": (400.0,), "error_estimate": False}
     return run(Seal(**{**given, **changes}), Silent())
 

@@ -6,6 +6,7 @@ from math import inf, radians
 import numpy as np
 import pytest
 
+from softehl.cases.harness.observer import Outcome
 from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.meshing.o_grid import MOST_LAYERS, SHORT, STEEPEST_GROWTH
@@ -18,7 +19,7 @@ from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.solve.load_stages import PathDriver
 from softehl.cases.seal.states.contacts import contact_edges
-from softehl.cases.seal.states.state import Outcome, Silent
+from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.runtime.arrays import Array
 from tests.cases.oring_cases import oring
 
@@ -32,7 +33,7 @@ def _contact(density: int, mesh: str = "graded", p_s: float = 1.0) -> tuple[Seal
 
 
 @cache
-def _curve(**changes: object) -> Outcome:
+def _curve(**changes: object) -> Outcome[FilmState]:
     return run(oring(**changes), Silent())
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from softehl.cases.harness.observer import Outcome
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.definition import SHEAR, WALLS
 from softehl.cases.seal.gland.parameters import Seal
@@ -15,10 +16,10 @@ from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.contact_stages import contact_problem
 from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.solve.load_stages import PathDriver
-from softehl.cases.seal.states.state import Outcome, Silent
+from softehl.cases.seal.states.state import FilmState, Silent
 
 
-def solved(**changes: Any) -> Outcome:
+def solved(**changes: Any) -> Outcome[FilmState]:
     given = {"density": 1, "speeds": (800.0,), "stroke": "out", "error_estimate": False}
     return run(Seal(**{**given, **changes}), Silent())
 

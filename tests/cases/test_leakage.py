@@ -17,8 +17,8 @@ from softehl.cases.oring import CASE
 from softehl.cases.seal.cycle.transient import March, Reading
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
-from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.state import OSCILLATING, UNDER_RESOLVED, FilmRow
+from softehl.cases.seal.states.state_files import report_film
 from softehl.runtime.io import read_csv, read_json
 from tests.cases.test_cli import film_state
 
@@ -77,9 +77,9 @@ def test_the_worse_verdict_of_the_two_is_kept() -> None:
 def test_a_run_of_both_strokes_writes_the_table(tmp_path: Path) -> None:
     run = Run(CASE, Seal(speeds=(400.0, 100.0)))
     record = RunRecord(tmp_path / "both", run, "refuse")
-    observer = ObserverAdapter(RecordingObserver(Display(), "both", record=record))
+    observer = RecordingObserver(Display(), CASE, "both", record=record)
     for speed in (400.0, -400.0, 100.0):
-        observer.film_state(film_state(run.parameters, speed))
+        report_film(observer, film_state(run.parameters, speed))
         assert (record.folder / "leakage.csv").exists() == (speed != 400.0)
     (only,) = read_csv(record.folder / "leakage.csv", LeakageRow.header())
     assert only[1] == "400"

@@ -6,7 +6,7 @@ from typing import Unpack
 import numpy as np
 import pytest
 
-from softehl.cases.harness.observer import StepReport
+from softehl.cases.harness.observer import Outcome, StepReport
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.report.section import boundary_edges
 from softehl.cases.seal.solve.driver import run
@@ -17,7 +17,6 @@ from softehl.cases.seal.states.state import (
     UNDER_RESOLVED,
     ContactState,
     FilmState,
-    Outcome,
     Silent,
 )
 from softehl.runtime.contact.rigid_obstacles import tributary_areas
@@ -44,14 +43,16 @@ class Recorder(Silent):
 
 
 @pytest.fixture(scope="module")
-def default() -> tuple[Outcome, Recorder]:
+def default() -> tuple[Outcome[FilmState], Recorder]:
     """Density 2, m_p = 4, p_s = 1, both strokes: the run of the README."""
     recorder = Recorder()
     speeds = (1600.0, 800.0, 400.0, 200.0, 100.0)
     return run(oring(density=2, speeds=speeds), recorder), recorder
 
 
-def test_every_requested_state_converges_and_is_told(default: tuple[Outcome, Recorder]) -> None:
+def test_every_requested_state_converges_and_is_told(
+    default: tuple[Outcome[FilmState], Recorder],
+) -> None:
     outcome, recorder = default
     assert outcome.converged, outcome.message
     speeds = [s.rod_speed for s in outcome.states]
@@ -62,7 +63,9 @@ def test_every_requested_state_converges_and_is_told(default: tuple[Outcome, Rec
     assert max(recorder.fractions) == 1.0
 
 
-def test_the_air_wall_carries_the_sealed_pressure(default: tuple[Outcome, Recorder]) -> None:
+def test_the_air_wall_carries_the_sealed_pressure(
+    default: tuple[Outcome[FilmState], Recorder],
+) -> None:
     """Axial balance without friction: p_s on the annulus inside of the housing."""
     section = default[1].contacts[0].section
     pressure = section.point_data["contact_pressure"]
@@ -89,12 +92,12 @@ def test_newton_ends_quadratically() -> None:
     assert checked > 30
 
 
-def test_flux_is_constant_outside_cavitation(default: tuple[Outcome, Recorder]) -> None:
+def test_flux_is_constant_outside_cavitation(default: tuple[Outcome[FilmState], Recorder]) -> None:
     outcome, _ = default
     assert max(s.flux_variation for s in outcome.states) < 1e-6
 
 
-def test_film_thickness_against_a_fine_mesh(default: tuple[Outcome, Recorder]) -> None:
+def test_film_thickness_against_a_fine_mesh(default: tuple[Outcome[FilmState], Recorder]) -> None:
     outcome, _ = default
     fine = {1600: 3.1836, 400: 1.3748, 100: 0.5945, -1600: 2.6314, -400: 1.1363, -100: 0.4913}
     for state in outcome.states:
@@ -105,7 +108,7 @@ def test_film_thickness_against_a_fine_mesh(default: tuple[Outcome, Recorder]) -
 
 @pytest.mark.parametrize("first", [0, 5])
 def test_film_thickness_is_a_power_of_the_speed(
-    default: tuple[Outcome, Recorder], first: int
+    default: tuple[Outcome[FilmState], Recorder], first: int
 ) -> None:
     states = default[0].states[first : first + 5]
     h = [s.h_star_um for s in states]
@@ -116,7 +119,9 @@ def test_film_thickness_is_a_power_of_the_speed(
     assert friction == sorted(friction, reverse=True)
 
 
-def test_leakage_pressure_and_contact_of_each_state(default: tuple[Outcome, Recorder]) -> None:
+def test_leakage_pressure_and_contact_of_each_state(
+    default: tuple[Outcome[FilmState], Recorder],
+) -> None:
     outcome, recorder = default
     dry = recorder.contacts[0]
     for state in outcome.states:
@@ -172,14 +177,14 @@ def test_shear_stress_can_be_switched_off() -> None:
 
 
 @pytest.fixture(scope="module")
-def discontinuous() -> Outcome:
+def discontinuous() -> Outcome[FilmState]:
     """The same with discontinuous pressures, outstroke."""
     speeds = (1600.0, 400.0, 100.0)
     return run(oring(density=2, reynolds="dg", stroke="out", speeds=speeds), Recorder())
 
 
 def test_discontinuous_pressures_give_the_film_of_continuous_ones(
-    default: tuple[Outcome, Recorder], discontinuous: Outcome
+    default: tuple[Outcome[FilmState], Recorder], discontinuous: Outcome[FilmState]
 ) -> None:
     assert discontinuous.converged, discontinuous.message
     assert discontinuous.unknowns["pressure"] == 5 * 54
@@ -192,7 +197,7 @@ def test_discontinuous_pressures_give_the_film_of_continuous_ones(
         assert other.pressure_jump_max_MPa == 0.0
 
 
-def test_a_profile_shows_both_sides_of_a_facet(discontinuous: Outcome) -> None:
+def test_a_profile_shows_both_sides_of_a_facet(discontinuous: Outcome[FilmState]) -> None:
     for state in discontinuous.states:
         profile = state.profile
         x, p, h = (values.reshape(54, 7) for values in (profile.x_mm, profile.p_MPa, profile.h_um))
@@ -205,7 +210,7 @@ def test_a_profile_shows_both_sides_of_a_facet(discontinuous: Outcome) -> None:
         assert np.all(np.diff(profile.x_mm) >= -1e-12)
 
 
-def test_jumps_fall_with_the_order(discontinuous: Outcome) -> None:
+def test_jumps_fall_with_the_order(discontinuous: Outcome[FilmState]) -> None:
     parameters = {"density": 2, "reynolds": "dg", "stroke": "out", "speeds": (1600.0,)}
     low = run(oring(pressure_order=2, **parameters), Recorder()).states[0]
     assert low.pressure_jump_max_MPa > 3.0 * discontinuous.states[0].pressure_jump_max_MPa
@@ -221,7 +226,7 @@ def test_a_low_order_is_reached_from_a_higher_one() -> None:
     assert outcome.states[-1].h_star_um == pytest.approx(0.726024, rel=1e-4)
 
 
-def test_states_of_a_coarse_mesh_are_labelled(default: tuple[Outcome, Recorder]) -> None:
+def test_states_of_a_coarse_mesh_are_labelled(default: tuple[Outcome[FilmState], Recorder]) -> None:
     """Density 2: outstroke is sound, instroke oscillates, its slow end has too short an inlet."""
     out, back = default[0].states[:5], default[0].states[5:]
     assert [s.verdict for s in out] == [UNCERTAIN] * 5  # sound, but nothing says how accurate

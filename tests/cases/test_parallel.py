@@ -13,14 +13,14 @@ from typing import Any
 
 import pytest
 
-from softehl.cases.harness import observer as harness
 from softehl.cases.harness.case import Run
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.observer import RunObserver
+from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.process_pool import completed, processes, solve_side_by_side
 from softehl.cases.harness.sweep import Curve, Task, in_order
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.states.state import FilmState
 from softehl.cases.shipped import solve_cases
 from softehl.runtime.kernels.kernel import ArgumentError, MissingKernelsError, StaleKernelsError
 from softehl.runtime.solve.linear.direct import MissingBackend
@@ -100,13 +100,13 @@ def alive(pid: int) -> bool:
 # --- strokes side by side -------------------------------------------------------------------------
 
 
-def tell_and_end(parameters: Seal, observer: RunObserver) -> harness.RunOutcome:
+def tell_and_end(parameters: Seal, observer: Observer) -> Outcome[FilmState]:
     for number in range(500):
         observer.stage(str(number), title="", where={})
     return outcome()
 
 
-class Counter(RunObserver):
+class Counter(Observer):
     """Keeps what it is told; may have no room for more."""
 
     def __init__(self, room: int) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from softehl.__main__ import main
 from softehl.cases.harness.report.page import read_finished
-from softehl.cases.seal.states.observer_adapter import read_profile
+from softehl.cases.seal.states.state_files import read_profile
 from softehl.cases.shipped import SHIPPED
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")

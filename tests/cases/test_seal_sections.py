@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from softehl.cases.harness.observer import Outcome
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.system import SealSystem, build_system
@@ -30,7 +31,7 @@ from softehl.cases.seal.states.contacts import (
     overlap,
 )
 from softehl.cases.seal.states.results import filled_ratio, film_parts, metering, parted_fluxes
-from softehl.cases.seal.states.state import Outcome, Silent
+from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.cases.seal.states.verdict import (
     ContactNumbers,
     FilmNumbers,
@@ -50,7 +51,7 @@ def _contact(**changes: Any) -> tuple[SealSystem, Array]:
 
 
 @cache
-def _curve(**changes: Any) -> Outcome:
+def _curve(**changes: Any) -> Outcome[FilmState]:
     return run(Seal(**{"error_estimate": False, **changes}), Silent())
 
 

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
+from softehl.cases.harness.observer import Outcome
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.driver import run
-from softehl.cases.seal.states.state import Outcome
+from softehl.cases.seal.states.state import FilmState
 from softehl.runtime.discretisation.problem import Problem
 from tests.cases.oring_cases import oring
 from tests.cases.test_method import Recorder
@@ -25,7 +26,7 @@ def reversed_sign(parameters: Seal, strength: float) -> Seal:
 
 
 @cache
-def solved(strength: float, **changes: Any) -> Outcome:
+def solved(strength: float, **changes: Any) -> Outcome[FilmState]:
     parameters = oring(**{"density": 1, "stroke": "out", "speeds": (1600.0, 400.0), **changes})
     outcome = run(reversed_sign(parameters, strength), Recorder())
     assert outcome.converged, outcome.message
@@ -76,7 +77,7 @@ def test_newton_converges_quadratically_with_it() -> None:
     outcome = solved(1.0, solver="monolithic")
     checked = 0
     for stage in outcome.stages:
-        for norms in stage.residual_histories if stage.stroke == "out" else ():
+        for norms in stage.residual_histories if stage.where["stroke"] == "out" else ():
             above = [k for k, norm in enumerate(norms) if norm > 1e-6]
             if above and norms[-1] <= 1e-6 and len(norms) > 1:  # steps in time end before
                 assert norms[above[-1] + 1] <= max(1e-8, norms[above[-1]] ** 1.5), norms

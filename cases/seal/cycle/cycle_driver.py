@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.harness.observer import RunObserver, RunOutcome
+from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.seal.correctors.schur_corrector import StaleTangent
 from softehl.cases.seal.cycle.motion import Motion
 from softehl.cases.seal.cycle.transient import (
@@ -30,7 +30,6 @@ from softehl.cases.seal.solve.failure_messages import explained
 from softehl.cases.seal.solve.film_solver import NoFilm
 from softehl.cases.seal.solve.load_stages import StageError
 from softehl.cases.seal.solve.squeeze_film import film_layer
-from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.runtime.analyses.time_integrators import BDF2, Euler
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear.linear_solver import Condenser
@@ -75,13 +74,13 @@ Log = Callable[[int, Films, Reading, Any], Any]
 """A row of the number of a cycle, what happened in it, the reading before it, the last row."""
 
 
-def run_cycles(parameters: Any, motion: Motion, observer: RunObserver, log: Log) -> RunOutcome:
+def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) -> Outcome[Any]:
     """All cycles of a case; log: makes a row of each.  Failure is in the outcome's status."""
     speed = motion.speed.at(0.0)
     changes = {"speeds": (speed,), "stroke": "out", "error_estimate": False, "tolerance": None}
     p: Seal = parameters.model_copy(update={**changes, "sealed_pressure": motion.pressure.at(0.0)})
     try:
-        contact = DryContact.of(p, ObserverAdapter(observer))
+        contact = DryContact.of(p, observer)
     except StageError as failed:
         return _outcome(p, *explained(failed, p))
     film, linear = contact.film("out", speed), contact.newton.linear
@@ -101,7 +100,7 @@ def run_cycles(parameters: Any, motion: Motion, observer: RunObserver, log: Log)
     return _outcome(p, Status.CONVERGED, "all cycles")
 
 
-def _cycles(march: March, x: Array, count: int, observer: RunObserver, log: Log) -> Branch | None:
+def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) -> Branch | None:
     """All cycles; the one that did not come to its end, if there is one."""
     reading, done, last = march.initialise(x), 0, None
     while (saved := observer.saved_row(float(done + 1))) is not None:
@@ -117,12 +116,12 @@ def _cycles(march: March, x: Array, count: int, observer: RunObserver, log: Log)
     return None
 
 
-def _cycle(march: March, number: int, observer: RunObserver) -> tuple[Films, Branch]:
+def _cycle(march: March, number: int, observer: Observer) -> tuple[Films, Branch]:
     """A cycle, from its start or from the last draft of it."""
     films, key, period, saved = Films(), float(number), march.motion.period, time.monotonic()
     # its condensations are its own, so that a run that goes on from here does the same
     march.corrector = replace(march.corrector, tangent=StaleTangent())
-    observer.stage(f"cycle {number}", title=f"cycle {number}", where={})
+    observer.stage(f"cycle {number}")
     if (draft := observer.drafted(key)) is not None:
         tables = taken_up(march, draft)
         films = Films(repeated(march, tables["loop"]), [tables["film"]], [tables["outline"]])
@@ -161,7 +160,7 @@ def _outline(march: March, instant: Instant) -> dict[str, Array]:
     return {"t_s": np.full(len(z), instant.t), "z_mm": z.copy(), "r_mm": r.copy()}
 
 
-def _outcome(p: Seal, status: Status, message: str) -> RunOutcome:
+def _outcome(p: Seal, status: Status, message: str) -> Outcome[Any]:
     system = build_system(p)
     kernels = {b.kernel.name: b.kernel.signature for b in system.problem.assembler.blocks}
-    return RunOutcome((), status, message, system.counts, kernels)
+    return Outcome((), status, message, system.counts, kernels)

@@ -16,8 +16,8 @@ from softehl.cases.harness.report.plot import COLOURS, plot, put_legend_above
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.profiles import position_range, thicknesses
-from softehl.cases.seal.states.observer_adapter import read_profile
 from softehl.cases.seal.states.state import FilmRow
+from softehl.cases.seal.states.state_files import read_profile
 
 _DASHES = {"out": "solid", "in": "dashed"}
 _MOVE = """

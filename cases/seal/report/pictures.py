@@ -29,8 +29,8 @@ from softehl.cases.seal.report import style
 from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import section_figure, views_of
 from softehl.cases.seal.report.tables import SHOWN, Slopes, fit_of, read_slopes
-from softehl.cases.seal.states.observer_adapter import read_profile
 from softehl.cases.seal.states.state import FilmRow
+from softehl.cases.seal.states.state_files import read_profile
 from softehl.runtime.arrays import Array
 
 

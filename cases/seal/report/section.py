@@ -18,8 +18,8 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import FreeSeal, Gland
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.paraview import gland_lines
-from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 from softehl.cases.seal.states.state import FilmRow, Profile, Section
+from softehl.cases.seal.states.state_files import read_profile, read_section
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.postprocessing import von_mises
 from softehl.runtime.mesh.face_matching import unrepeated_faces

@@ -16,6 +16,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.observer import Observer
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.seal.gland.fit_geometry import DIAMETERS
 from softehl.cases.seal.gland.parameters import Seal
@@ -27,7 +28,8 @@ from softehl.cases.seal.solve.driver import DryContact, Judge, verdict_of_contac
 from softehl.cases.seal.solve.film_solver import NoFilm
 from softehl.cases.seal.solve.load_stages import StageError
 from softehl.cases.seal.states.sensitivity_table import differentiable
-from softehl.cases.seal.states.state import FilmState, Observer
+from softehl.cases.seal.states.state import FilmState
+from softehl.cases.seal.states.state_files import report_film
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.newton import Newton, NonlinearProblem
@@ -334,7 +336,7 @@ class HeldFilm:
             return None
         judge = Judge(verdict_of_contact(contact.system, contact.x), differentiation(p))
         film, state = result.film, judge.state(result, None)
-        observer.film_state(state)
+        report_film(observer, state)
         return cls(FilmCase(film.system, film.loads), film.x, contact.newton, state)
 
     def change(self, quantity: str, key: str, factor: float) -> float | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 
+from softehl.cases.harness.observer import Observer, Outcome, StageRecord
 from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
@@ -29,13 +30,8 @@ from softehl.cases.seal.states.estimate import reservation
 from softehl.cases.seal.states.results import film_state
 from softehl.cases.seal.states.run_plan import strokes_of
 from softehl.cases.seal.states.sensitivity_table import differentiable
-from softehl.cases.seal.states.state import (
-    ContactState,
-    FilmState,
-    LoadStageRecord,
-    Observer,
-    Outcome,
-)
+from softehl.cases.seal.states.state import ContactState, FilmState
+from softehl.cases.seal.states.state_files import report_contact, report_film
 from softehl.cases.seal.states.verdict import (
     FilmNumbers,
     Verdict,
@@ -156,7 +152,7 @@ def run(
     observer: Observer,
     contacts: Path | None = None,
     differentiate: Differentiate | None = None,
-) -> Outcome:
+) -> Outcome[FilmState]:
     """Solve a seal and report to the observer; failure is in the outcome's status.
 
     contacts: folder of contact states (`cases.seal.solve.contact_meshes`) to start from and add to.
@@ -167,7 +163,7 @@ def run(
     except StageError as failed:  # the size of the problem alone is reported
         failures = [explained(failed, parameters)]
         return _outcome(build_system(parameters), failed.records, [], failures)
-    observer.contact_state(contact.state)
+    report_contact(observer, contact.state)
     judge = Judge(verdict_of_contact(contact.system, contact.x), differentiate)
     states, failures = list[FilmState](), list[tuple[Status, str]]()
     for stroke in strokes_of(parameters):
@@ -178,7 +174,7 @@ def run(
                 missed.append(result)
                 continue
             states.append(judge.state(result, last[-1].film.numbers if last else None))
-            observer.film_state(states[-1])
+            report_film(observer, states[-1])
             last.append(result)
         if missed:
             failures.append(without_films(missed, parameters))
@@ -188,11 +184,11 @@ def run(
 
 def _outcome(
     system: SealSystem,
-    records: Sequence[LoadStageRecord],
+    records: Sequence[StageRecord],
     states: list[FilmState],
     failures: list[tuple[Status, str]],
     numbers: Mapping[str, float] | None = None,
-) -> Outcome:
+) -> Outcome[FilmState]:
     blocks, p = system.problem.assembler.blocks, system.parameters
     return Outcome(
         states=tuple(states),

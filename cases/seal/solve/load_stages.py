@@ -10,7 +10,8 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from softehl.cases.seal.states.state import LoadStageRecord, Observer, operating_point
+from softehl.cases.harness.observer import Observer, StageRecord
+from softehl.cases.seal.states.state import operating_point
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.continuation import Continuation, StepRule
@@ -53,7 +54,7 @@ class StageError(Exception):
 
     load_stage: Stage
     branch: Branch
-    records: Sequence[LoadStageRecord] = ()
+    records: Sequence[StageRecord] = ()
 
     def __str__(self) -> str:
         """Words on how far the stage came, and what may help."""
@@ -76,7 +77,7 @@ class PathDriver:
 
     observer: Observer
     newton: Newton = field(default_factory=lambda: Newton(max_iterations=10))
-    records: list[LoadStageRecord] = field(default_factory=list)
+    records: list[StageRecord] = field(default_factory=list)
 
     def follow(self, load_stage: Stage, x0: Array) -> Array:
         """Unknowns (n,) at the end of a stage that begins with a solution near x0 (n,).
@@ -151,7 +152,7 @@ class LoadStageLog:
     def end(self, spent: Branch | Solution, ended: str = "") -> None:
         """Record what was spent; ended: words on a stage that failed."""
         self.driver.records.append(
-            LoadStageRecord(
+            StageRecord(
                 name=self.name,
                 seconds=time.perf_counter() - self.start_time,
                 factorisations=spent.factorisations,

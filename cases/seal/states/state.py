@@ -6,10 +6,10 @@ Units are mm, MPa, N, s; film thicknesses are in micrometres.
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import nan
-from typing import Any, Protocol, Unpack
+from typing import Any
 
-from softehl.cases.harness import observer as harness
 from softehl.cases.harness.file_content import Cells
+from softehl.cases.harness.observer import Observer
 from softehl.cases.harness.row import OK, Row, column
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import number_text
@@ -269,73 +269,21 @@ def operating_point(sealed_pressure: float, stroke: str) -> dict[str, Any]:
     return {"sealed_pressure_MPa": sealed_pressure, "stroke": stroke}
 
 
-@dataclass(frozen=True)
-class LoadStageRecord(harness.StageRecord):
-    """Cost of one stage of the path; its parameter is a load, or counts the steps of a film."""
+def stage_label(name: str, marks: Mapping[str, Any]) -> tuple[str, Mapping[str, Any]]:
+    """Title and marks of a stage of a seal, see `Case.stage_label`."""
+    if "sealed_pressure" not in marks:
+        return name, marks
+    sealed_pressure, stroke = marks["sealed_pressure"], marks["stroke"]
+    title = f"{name}, p_s = {sealed_pressure:g} MPa, stroke {stroke}"
+    return title, operating_point(sealed_pressure, stroke)
 
-    @property
-    def stroke(self) -> str:
-        """ "out", "in" or, before the strokes part, "both"."""
-        return str(self.where["stroke"])
 
+class Silent(Observer):
+    """Observer that does nothing; base of observers of a seal in tests and scripts.
 
-@dataclass(frozen=True)
-class Outcome(harness.RunOutcome):
-    """Result of a run: its films, and the cost of its stages.
-
-    Attributes
-    ----------
-    states : tuple of FilmState
-        Films in the order of the run.
-    status : Status
-        Whether all states were reached.
-    message : str
-        Reason, if they were not.
-    unknowns : mapping of str to int
-        Number of unknowns, "total" and of parts.
-    kernel_signatures : mapping of str to str
-        Kernel -> signature of the compiled kernel.
-    stages : tuple of LoadStageRecord
-        Cost of each stage.
-    solvers : mapping of str to str
-        "linear" -> the linear solver in use, "solver" -> the method that was requested.
-    numbers : mapping of str to float
-        Further results, name with unit -> value.
+    An observer that has `film_state` or `contact_state` is told of films and contacts by it,
+    otherwise by `state` and `files`.
     """
-
-    states: tuple[FilmState, ...]
-    stages: tuple[LoadStageRecord, ...] = ()
-
-
-class Observer(Protocol):
-    """Listener of a run of a seal; calls come in order, from one thread."""
-
-    def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
-        """Begin a stage.
-
-        Parameters
-        ----------
-        name : str
-            Name of the stage.
-        sealed_pressure : float
-            Sealed pressure [MPa].
-        stroke : str
-            "out", "in" or "both".
-        steps : int or None
-            Number of expected steps; None if the path decides.
-        """
-        return None
-
-    def step(self, **step: Unpack[harness.StepReport]) -> None:
-        """Report a converged step of the path.
-
-        Parameters
-        ----------
-        **step
-            `label`, `parameter`, `iterations`, `residuals` and `fraction` of the step; the label is
-            for instance "U [mm/s]" or "load".
-        """
-        return None
 
     def contact_state(self, state: ContactState) -> None:
         """Report the frictionless contact.
@@ -356,7 +304,3 @@ class Observer(Protocol):
             The film.
         """
         return None
-
-
-class Silent(Observer):
-    """Observer that does nothing, for tests and scripts."""
