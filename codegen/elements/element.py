@@ -129,7 +129,8 @@ class Element:
     @cached_property
     def _gradients(self) -> tuple[list[Any], list[list[Any]]]:
         """Parent coordinates, and derivatives of every shape function by them."""
-        coordinates: list[Any] = [sp.Dummy(real=True) for _ in range(self.dimension)]
+        names = [f"xi_{k}" for k in range(self.dimension)]  # by which SymPy orders terms
+        coordinates: list[Any] = [sp.Dummy(name, real=True) for name in names]
         return coordinates, [[sp.diff(N, s) for s in coordinates] for N in self.shape(*coordinates)]
 
     def coefficients(self) -> sp.Matrix:

@@ -24,6 +24,7 @@ from softehl.codegen.graph.routines import (
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.flatten import Entries, call_function, fraction
+from softehl.codegen.language.named_symbols import placeholders
 from softehl.codegen.language.sympy_lowering import Symbols
 
 
@@ -55,7 +56,8 @@ def implicit(
 
     condensed: of the equations and the unknowns, the equations without integrals.
     """
-    begin, unknowns = Entries.of(start), Entries.of(start).map(lambda _: sp.Dummy(real=True))
+    begin = Entries.of(start)
+    unknowns = Entries(placeholders(len(begin.values), real=True), begin.suffixes, begin.arrange)
     local = symbols.placeholders(name, unknowns)
     residuals = Entries.of(call_function(name, equations, unknowns.shaped()))
     if len(residuals.values) != len(local):
@@ -119,7 +121,7 @@ def principal(
             f"{name}: write m.principal({name!r}, C, lambda a, b, c: ...), e.g. with C = F.T * F"
         )
     entries = _symmetric_entries(symbols, name, C)
-    squares = Entries([sp.Dummy(positive=True) for _ in range(3)], ("", "", ""), list)
+    squares = Entries(placeholders(3, positive=True), ("", "", ""), list)
     local = symbols.placeholders(name, squares)
     written = call_function(name, energy, *(sp.sqrt(c) for c in squares.values))
     value = symbols.lower(written)

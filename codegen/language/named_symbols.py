@@ -57,6 +57,16 @@ def named(
     return Name(label, values[0] if has_definition else None, below, prescribed)
 
 
+def placeholders(count: int, **assumptions: bool) -> list[Any]:
+    """New symbols of which no other code knows, in SymPy's order.
+
+    SymPy orders terms by names, and calls a Dummy without one by the number of those before it in
+    the process: Dummy_10 before Dummy_9.
+    """
+    width = len(str(count - 1))
+    return [sp.Dummy(f"s{k:0{width}}", **assumptions) for k in range(count)]
+
+
 def _direct(value: Any) -> set[Any]:
     """Symbols and names of an expression, without those inside the definitions of its names."""
     if not isinstance(value, sp.Basic):

@@ -12,6 +12,8 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.language.named_symbols import placeholders
+
 
 @dataclass(frozen=True)
 class Integral:
@@ -93,5 +95,6 @@ class SympyTape:
             if n == 1:
                 self.define(symbol, Slope(value, s))
             else:
-                sum_symbol = self.define(sp.Dummy(real=True), Slope(value, s))
+                (dummy,) = placeholders(1, real=True)
+                sum_symbol = self.define(dummy, Slope(value, s))
                 self.define(symbol, sum_symbol / n)

@@ -59,6 +59,24 @@ def one(equation: Callable[..., Any], *, start: Any = 1, name: str = "one", **gi
     return m
 
 
+def test_the_text_does_not_depend_on_symbols_made_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SymPy's name of a Dummy is the number of those before it, and orders terms by names."""
+
+    def text(count: int) -> str:
+        monkeypatch.setattr(sp.Dummy, "_count", count)
+        m = Model("ordered", nodes=1, rule=quadrature.point_rule())
+        x = m.unknown("x")
+
+        def equations(s: list[Any]) -> list[Any]:
+            return [sp.exp(s[0]) + sp.exp(s[1]) - x, s[0] - s[1] / 2]
+
+        s = m.implicit("s", equations, start=[0, 0])
+        m.potential(s[0] ** 2)
+        return pipeline.compile_model(m.finish()).text
+
+    assert text(998) == text(999)  # Dummy_998 is before Dummy_999, but 999 behind 1000
+
+
 # ------------------------------------------------------------------------------------- the values
 
 
