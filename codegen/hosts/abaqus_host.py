@@ -16,7 +16,7 @@ from softehl.codegen.hosts.element_interface import (
     UserInput,
 )
 from softehl.codegen.hosts.patch_mesh import Patch
-from softehl.codegen.hosts.test_states import Sample
+from softehl.codegen.hosts.test_states import Sample, renewed
 
 INCREMENTS = 4
 """Increments of the patch."""
@@ -78,15 +78,9 @@ def settings_of(interface: ElementInterface, s: Sample) -> list[float]:
     return values
 
 
-def _renewed(interface: ElementInterface, s: Sample, stored: int | None) -> list[float]:
+def _stored(interface: ElementInterface, s: Sample, stored: int | None) -> list[float]:
     """State of all points after a step, then the fields."""
-    width = len(interface.definition.fields)
-    rows = [list(row) for row in s.state.point_data]
-    for q, row in enumerate(rows):
-        for k, field in enumerate(interface.renewed):
-            if field is not None:
-                row[k] = s.fields[width * q + field]
-    return [*(v for row in rows for v in row), *s.fields][:stored]
+    return [*renewed(interface, s), *s.fields][:stored]
 
 
 def sample_file(
@@ -97,7 +91,7 @@ def sample_file(
     stored: numbers that the element stores; without it, state and fields.
     """
     order, size = interface.by_node(), len(interface.definition.unknowns)
-    after = _renewed(interface, references[0], stored)
+    after = _stored(interface, references[0], stored)
     head = [len(references), size, interface.definition.nodes, interface.dimension]
     lines = [
         " ".join(map(str, (*head, len(interface.inputs), len(after), len(references[0].fields))))
@@ -115,7 +109,7 @@ def sample_file(
             [*old, *[0.0] * len(s.fields)][:stored],
             [-s.residual[i] for i in order],
             matrix,
-            _renewed(interface, s, stored),
+            _stored(interface, s, stored),
         )
         lines += [" ".join(repr(float(v)) for v in group) for group in groups]
     return "\n".join(lines) + "\n"

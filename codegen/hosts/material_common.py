@@ -14,7 +14,7 @@ from softehl.codegen.elements import cells
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.abaqus_deck import named
-from softehl.codegen.hosts.abaqus_element import arguments, conditions
+from softehl.codegen.hosts.element_common import arguments, conditions
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.material_response import Measure, Response, solid
 from softehl.codegen.hosts.registry import StatesOf

@@ -27,6 +27,7 @@ GROUP = "softehl.hosts"
 BUILT_IN = {
     "c": "softehl.codegen.hosts.c_library:C",
     "cpp": "softehl.codegen.hosts.c_library:CPP",
+    "fortran": "softehl.codegen.hosts.fortran:FORTRAN",
     "abaqus": "softehl.codegen.hosts.abaqus_material:ABAQUS",
     "calculix": "softehl.codegen.hosts.calculix:CALCULIX",
     "jax": "softehl.codegen.hosts.jax:JAX",

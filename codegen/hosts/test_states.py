@@ -41,6 +41,17 @@ class Sample:
         return [float(v) for row in (self.state.data, *self.state.point_data) for v in row]
 
 
+def renewed(interface: ElementInterface, s: Sample) -> list[float]:
+    """Data of all points after a step that ends in a state."""
+    width = len(interface.definition.fields)
+    rows = [list(row) for row in s.state.point_data]
+    for q, row in enumerate(rows):
+        for k, field in enumerate(interface.renewed):
+            if field is not None:
+                row[k] = s.fields[width * q + field]
+    return [v for row in rows for v in row]
+
+
 def sample(interface: ElementInterface, kernel: KernelSource, state: State) -> Sample:
     """The values of all tasks at one state."""
     # where the loop over the points is written out, their data stand behind those of the element
