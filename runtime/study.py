@@ -54,9 +54,11 @@ from softehl.runtime.fit import objective as inverse
 from softehl.runtime.fit.jax_operation import Operation
 from softehl.runtime.fit.least_squares import Bounds, Fit, Measured
 from softehl.runtime.fit.objective import Objective, StudyEvaluations, varied_definition
+from softehl.runtime.kernels.explanation import Explanation
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.parallel.engine import AnyEngine
 from softehl.runtime.parallel.linear_solver_choice import Linear
+from softehl.runtime.results.explanation import explain_at
 from softehl.runtime.results.result import Modes, Result
 from softehl.runtime.sensitivity.input_parsing import By
 from softehl.runtime.sensitivity.inputs import Key
@@ -422,6 +424,39 @@ class Study:
             Statements contradict each other.
         """
         return build_system(self._definition, fields)
+
+    def explain(
+        self, element: int, t: float = 0.0, *, block: str | None = None, x: Array | None = None
+    ) -> Explanation:
+        """Return every named value of a page in one element, before anything is solved.
+
+        Parameters
+        ----------
+        element : int
+            Number of the element in its block, as messages name it.
+        t : float
+            Load factor.
+        block : str, optional
+            Name of the block; may be left out if there is one.
+        x : array (n,), optional
+            Unknowns; left out, the initial ones with the prescribed values at t.
+
+        Returns
+        -------
+        Explanation
+            Values at the quadrature points, and the first operation without a value, with the line
+            of the page. `Result.explain` has those of a result.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such block; a KeyError.
+        StudyError
+            The block is not named, x has another shape, or a page needs the length of a time step.
+        ArgumentError
+            There is no such element.
+        """
+        return explain_at(self.system(), element, block, t, x)
 
     def solve(
         self,

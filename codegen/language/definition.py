@@ -29,6 +29,15 @@ class Condition:
 
 
 @dataclass(frozen=True)
+class Statement:
+    """A value that a page names, and where: `file:line`. name: empty for an equation."""
+
+    name: str
+    value: Node
+    where: str
+
+
+@dataclass(frozen=True)
 class Component:
     """A scalar that varies in the cell.
 
@@ -142,6 +151,8 @@ class Definition:
         The model at a point.
     record : Record
         The model as it was written, by which kernels are checked.
+    statements : tuple of Statement
+        Named values, probes, fields and equations in the order of the page.
     """
 
     name: str
@@ -187,6 +198,8 @@ class Definition:
     """The same model at a point, from which the kernel of the whole element can be made as well."""
     record: SympyTape = field(default_factory=SympyTape, repr=False, compare=False)
     """The model as written, by which kernels are checked; nothing is derived from it."""
+    statements: tuple[Statement, ...] = field(default=(), repr=False, compare=False)
+    """Named values and equations with their lines, for explanations; nothing is derived from it."""
 
     def __repr__(self) -> str:
         """Summary in one line."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import sys
 import warnings
+from functools import cache
 from pathlib import Path
 from types import FrameType
 
+import softehl.errors
 from softehl.errors import SoftehlError
 
 
@@ -23,18 +25,31 @@ class ModelError(SoftehlError, ValueError):
 
 
 _CODEGEN = Path(__file__).resolve().parents[1]
+_PACKAGE = (
+    _CODEGEN,
+    _CODEGEN.parent / "runtime",
+    Path(softehl.errors.__file__).resolve().parent / "__init__.py",
+)
 
 
 def page_line() -> str:
     """File and line of the model that is being read, e.g. `my_model.py:12`."""
     frame: FrameType | None = sys._getframe(1)
     while frame is not None:
-        path = Path(frame.f_code.co_filename).resolve()
-        internal = path.is_relative_to(_CODEGEN) and not path.is_relative_to(_CODEGEN / "models")
-        if not internal and "sympy" not in path.parts and not path.name.startswith("<"):
+        path = _page_file(frame.f_code.co_filename)
+        if path:
             return f"{path}:{frame.f_lineno}"
         frame = frame.f_back
     return ""
+
+
+@cache
+def _page_file(filename: str) -> str:
+    """Path of a file of code that may be a page; empty for the generator and for SymPy."""
+    path = Path(filename).resolve()
+    internal = any(map(path.is_relative_to, _PACKAGE))
+    internal = internal and not path.is_relative_to(_CODEGEN / "models")
+    return "" if internal or "sympy" in path.parts or path.name.startswith("<") else str(path)
 
 
 class ModelWarning(UserWarning):

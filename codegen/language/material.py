@@ -107,6 +107,23 @@ class Material:
         """
         return self.model.define(f"{self.name}_{name}", expression)
 
+    def probe(self, name: str, value: Any) -> Any:
+        """Record a value for explanations, as `Model.probe`.
+
+        Parameters
+        ----------
+        name : str
+            Its name in `Kernel.explain` and `Study.explain`, after that of the material.
+        value : Expr or Matrix
+            The value.
+
+        Returns
+        -------
+        Expr or Matrix
+            The value itself.
+        """
+        return self.model.probe(f"{self.name}_{name}", value)
+
     def implicit(self, name: str, equations: Callable[[Any], Any], **settings: Any) -> Any:
         """Declare local unknowns, as `Model.implicit`.
 

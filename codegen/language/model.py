@@ -528,6 +528,23 @@ class Model(ModelBuilder):
         """
         self._outputs.add_fields(values)
 
+    def probe(self, name: str, value: Any) -> Any:
+        """Record a value for explanations; the mathematics and the kernel do not change.
+
+        Parameters
+        ----------
+        name : str
+            Its name in `Kernel.explain` and `Study.explain`.
+        value : Expr or Matrix
+            The value; of a matrix name_00, name_01, ...
+
+        Returns
+        -------
+        Expr or Matrix
+            The value itself.
+        """
+        return self._outputs.probe(name, value)
+
     def offer(
         self,
         *,

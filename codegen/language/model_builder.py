@@ -276,6 +276,7 @@ class Equations:
         constant, symbols = list(constant), self._symbols
         symbols.record.potentials.append((expression, tuple(constant)))
         value, frozen = symbols.lower(expression), [symbols.lower(s) for s in constant]
+        symbols.state("", value)
         if value.varying:
             raise ModelError(
                 f"the potential of {symbols.model} varies with the point: wrap it in integral(...)"
@@ -395,6 +396,7 @@ class Outputs:
         self.derivatives: list[tuple[str, Node]] = []
         self.product = self.pseudo_load = self.fields_rate = False
         self._tasks: tuple[str, ...] | None = None
+        self._probes: set[str] = set()
 
     @property
     def tasks(self) -> tuple[str, ...] | None:
@@ -415,6 +417,7 @@ class Outputs:
                 raise ModelError(f"the field {name} is given twice in model {self._symbols.model}")
             self._symbols.record.fields.append((name, value))
             self.fields.append((name, self._symbols.lower(value)))
+            self._symbols.state(name, self.fields[-1][1])
 
     def add_history(self, new: Mapping[str, Any], declared: Sequence[str]) -> None:
         """New values of some of the `declared` point data."""
@@ -427,6 +430,20 @@ class Outputs:
                 raise ModelError(f"history: {name} is given twice in model {self._symbols.model}")
             self._symbols.record.history.append((f"new_{name}", value))
             self.history.append((name, self._symbols.lower(value)))
+            self._symbols.state(f"new_{name}", self.history[-1][1])
+
+    def probe(self, name: str, value: Any) -> Any:
+        """Note a value for explanations; returns it."""
+        if isinstance(value, sp.MatrixBase):
+            for i in range(value.rows):
+                for j in range(value.cols):
+                    self.probe(f"{name}_{i}{j}", value[i, j])
+            return value
+        if name in self._symbols or name in self._probes:
+            raise ModelError(f"probe: the name {name} is used twice in model {self._symbols.model}")
+        self._probes.add(name)
+        self._symbols.state(name, self._symbols.lower(value))
+        return value
 
     def choose(self, tasks: Sequence[str] | None, *, product: bool) -> None:
         """Add tasks by name."""
@@ -560,6 +577,7 @@ class ModelBuilder:
             history=tuple(name for name, _ in o.history),
             internal=tuple(a.internal),
             record=self._symbols.record,
+            statements=tuple(self._symbols.statements),
         )
         check(definition)
         return definition

@@ -15,7 +15,8 @@ from softehl.codegen.graph.graph import Graph, Input, Node, Op
 from softehl.codegen.graph.length_derivatives import length
 from softehl.codegen.graph.traversal import Recursion, recursion
 from softehl.codegen.graph.value_domain import Domain, decidable
-from softehl.codegen.language.errors import ModelError
+from softehl.codegen.language.definition import Statement
+from softehl.codegen.language.errors import ModelError, page_line
 from softehl.codegen.language.flatten import Entries
 from softehl.codegen.language.named_symbols import named
 from softehl.codegen.language.sympy_tape import SympyTape
@@ -310,6 +311,7 @@ class Symbols:
         self.record = SympyTape()
         self.bound: dict[sp.Symbol, Node] = {}
         self.lower = Lowering(self.graph, self.bound)
+        self.statements: list[Statement] = []
         self._by_label: dict[str, Any] = {}
 
     def __contains__(self, label: str) -> bool:
@@ -344,6 +346,10 @@ class Symbols:
         ]
         return Entries(symbols, like.suffixes, like.arrange).shaped()
 
+    def state(self, label: str, node: Node) -> None:
+        """Note a value with its line on the page; label: empty for an equation."""
+        self.statements.append(Statement(label, node, page_line()))
+
     def placeholders(self, label: str, symbols: Entries) -> list[Node]:
         """Inputs in place of local unknowns while their equations are recorded."""
         nodes = [self.graph.input(f"local {label}", k) for k in range(len(symbols.values))]
@@ -358,9 +364,12 @@ class Symbols:
             raise ModelError(
                 f"the name {label} is used twice in model {self.model}, for {kinds}: rename one"
             )
+        known = symbol in self.bound
         self.bound[symbol] = node
         if isinstance(node.payload, Input):
             self.record.inputs[symbol] = (node.payload.array, node.payload.index)
+        elif not known:
+            self.state(label, node)
         return symbol
 
 

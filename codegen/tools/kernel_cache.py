@@ -62,6 +62,52 @@ def folder_of(
     where: cells and geometry of weak forms, and whether materials are wanted. derivatives:
     the kernels of `Definition.for_derivatives` instead.
     """
+    folder = _folder_of(source, where, derivatives=derivatives)
+    text = model_text.digest(model_text.sources(source)) if isinstance(source, Path) else ""
+    _ORIGINS[folder] = Origin(source, where, text)
+    return folder
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Source of the kernels of a folder: a model or the name of a law; digest of a file."""
+
+    source: Path | Definition | Page | Law | str
+    where: CellKey
+    text: str = ""
+
+
+_ORIGINS: dict[Path, Origin] = {}
+"""Of the folders that this process has loaded."""
+
+
+def definition_of(folder: Path, kernel: str) -> Definition | None:
+    """The model of a kernel of a folder that this process has loaded; None where it is not known.
+
+    Raises `ModelFileError` if its file has changed since.
+    """
+    from softehl.codegen.language.weak_form import CellOptions
+    from softehl.codegen.models.material_elements import law
+    from softehl.codegen.tools import model_loader
+
+    origin = _ORIGINS.get(folder)
+    if origin is None:
+        return None
+    source, where = origin.source, origin.where
+    if isinstance(source, Path):
+        if model_text.digest(model_text.sources(source)) != origin.text:
+            raise ModelFileError(f"{source} has changed since it was loaded: start Python anew")
+        cells, geometry, materials = where
+        on = CellOptions(cells, geometry or None, materials)
+        definitions = model_loader.definitions(source, on)
+    else:
+        definitions = _definitions(law(source) if isinstance(source, str) else source, where)
+    return next((d for d in definitions if d.name == kernel), None)
+
+
+def _folder_of(
+    source: Path | Definition | Page | Law, where: CellKey, *, derivatives: bool
+) -> Path:
     cells, geometry, materials = where
     if derivatives:
         return _for_derivatives(source, where)
@@ -112,6 +158,12 @@ def _for_derivatives(source: Path | Definition | Page | Law, where: CellKey) -> 
 
 def of_law(name: str, where: CellKey, *, derivatives: bool = False) -> Path:
     """Folder of the kernels of a material that ships; raises ValueError for another name."""
+    folder = _folder_of_law(name, where, derivatives=derivatives)
+    _ORIGINS[folder] = Origin(name, where)
+    return folder
+
+
+def _folder_of_law(name: str, where: CellKey, *, derivatives: bool) -> Path:
     cells, geometry, _ = where
     key = store.digest(["law", generator(), name, *cells, geometry, str(derivatives)])
     files = store.recall(key)

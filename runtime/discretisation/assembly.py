@@ -16,7 +16,12 @@ from scipy.sparse import csc_array
 from softehl.errors import UnknownNameError
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.element_blocks import ElementBlock
-from softehl.runtime.discretisation.problem_checks import not_finite, require_sound_elements
+from softehl.runtime.discretisation.problem_checks import (
+    fault_message,
+    not_finite,
+    require_sound_elements,
+    rows_not_finite,
+)
 from softehl.runtime.discretisation.sparsity import Pattern, Structure
 from softehl.runtime.suggestions import short_list
 
@@ -323,9 +328,11 @@ class Assembler:
         """
         for block in self.blocks:
             if block.name in parameters:
-                message = not_finite(block, block.tangent(x, parameters[block.name]))
+                results = block.tangent(x, parameters[block.name])
+                message = not_finite(block, results)
                 if message:
-                    return message
+                    row = int(rows_not_finite(results)[0])
+                    return message + fault_message(block, x, parameters[block.name], row)
         return ""
 
     def linearise(

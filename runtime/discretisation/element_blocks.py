@@ -10,7 +10,8 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.mass import MassKernel
-from softehl.runtime.kernels.kernel import Kernel, Rule
+from softehl.runtime.kernels.explanation import Explanation
+from softehl.runtime.kernels.kernel import Kernel, KernelError, Rule
 
 Again: TypeAlias = Callable[[Array, Array, Array | None], None]
 """A task of a kernel: of its unknowns, and of the values and the tangent that it writes."""
@@ -285,6 +286,35 @@ class ElementBlock:
         for name, numbers in internal.items():
             by_name.setdefault(name, np.repeat(x[numbers][:, None], values.shape[1], axis=1))
         return by_name
+
+    def explain(self, x: Array, parameters: Array, element: int) -> Explanation:
+        """Return the named values of the page in one element, as `Kernel.explain`.
+
+        Parameters
+        ----------
+        x : array (size,)
+            All unknowns.
+        parameters : array (k,)
+            Parameters of the kernel.
+        element : int
+            Number of the element in the block.
+
+        Returns
+        -------
+        Explanation
+            Values at the quadrature points, and the first operation without a value.
+
+        Raises
+        ------
+        KernelError
+            The block has no page.
+        """
+        if not isinstance(self.kernel, Kernel):
+            raise KernelError(f"block {self.name!r} has no page")
+        arguments = self.given(parameters)
+        return self.kernel.explain(
+            self.coordinates, self._gathered(x), element=element, **arguments
+        )
 
     @property
     def internal(self) -> dict[str, Integers]:

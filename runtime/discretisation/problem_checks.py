@@ -151,6 +151,15 @@ def not_finite(block: ElementBlock, results: Sequence[Array]) -> str:
     return element_name(block, int(invalid[0])) + more
 
 
+def fault_message(block: ElementBlock, x: Array, parameters: Array, row: int) -> str:
+    """The operation of a page without a value in an element; empty where it is not known."""
+    try:
+        fault = block.explain(x, parameters, row).fault
+    except (SoftehlError, ImportError):
+        return ""  # no page, or no SymPy
+    return f": {fault}" if fault else ""
+
+
 def rows_not_finite(results: Sequence[Array]) -> Integers:
     """Numbers of the elements that have a result, (n, ...), that is not finite."""
     invalid: Flags = np.zeros(len(results[0]), dtype=bool)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array
+from softehl.runtime.kernels.explanation import ElementState, Explanation, explanation
 from softehl.runtime.kernels.kernel_call import ArgumentError, Call, CallArguments, Family, Rule
 from softehl.runtime.kernels.shared_library import (
     GENERATED,
@@ -306,6 +307,67 @@ class Kernel(Family):
         """
         call = Call(self, "fields", coordinates, dofs, CallArguments(**kwargs))
         return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
+
+    def explain(
+        self, coordinates: Array, dofs: Array, *, element: int = 0, **kwargs: Any
+    ) -> Explanation:
+        """Return every named value of the page in one element, and the first that has no value.
+
+        Parameters
+        ----------
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        element : int
+            Number of the element.
+        **kwargs : array
+            Data and parameters; see the class.
+
+        Returns
+        -------
+        Explanation
+            Values at the quadrature points, with the lines of the page.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or there is no such element.
+        ModelFileError
+            The kernel comes from a folder: its page is not known to this process.
+        SymPyNeededError
+            SymPy is not installed.
+
+        Notes
+        -----
+        The page is evaluated with 30 digits; the kernel is not called.
+        """
+        coordinates, dofs = (
+            np.atleast_2d(np.asarray(a, dtype=np.float64)) for a in (coordinates, dofs)
+        )
+        task = next(t for t in ("residual", "tangent", *self.tasks) if t in self.tasks)
+        n = len(dofs)
+        if not -n <= element < n:
+            raise ArgumentError(f"{self.name}: element = {element}; there are {n} elements")
+        one = slice(element % n, element % n + 1)
+        given = {k: v[one] if k in _OF_ELEMENTS else v for k, v in kwargs.items() if v is not None}
+        call = Call(self, task, coordinates[one], dofs[one], CallArguments(**given))
+        points, columns = len(call.rule.weights), len(self.data)
+        data = call.read[2].ravel()
+        state = ElementState(
+            coordinates=call.read[0].ravel(),
+            dofs=call.read[1].ravel(),
+            data=data[:columns],
+            parameters=call.read[3],
+            point_data=data[columns:].reshape(points, -1),
+            rule=call.rule.table,
+            basis=call.rule.shape_functions,
+        )
+        return explanation(self.library.directory, self.name, state)
+
+
+_OF_ELEMENTS = ("data", "point_data")
+"""Arguments of a call that have a row for each element."""
 
 
 @cache

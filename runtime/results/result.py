@@ -25,8 +25,10 @@ from softehl.runtime.equations.interpolation import (
 )
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.stability import negative_directions
+from softehl.runtime.kernels.explanation import Explanation
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError, place_text
+from softehl.runtime.results.explanation import explain_element
 from softehl.runtime.results.output import VtuFields, piece_names
 from softehl.runtime.results.recovery import nodal_operator
 from softehl.runtime.sensitivity.input_parsing import By, inputs
@@ -342,6 +344,32 @@ class Result:
         fields = self.problem.fields(block, self.point.solution.x)
         new = [f"new_{name}" for name in self.system.blocks[block].kernel.history]
         return {name: values for name, values in fields.items() if name not in new}
+
+    def explain(self, element: int, block: str | None = None) -> Explanation:
+        """Return every named value of a page in one element, as `Kernel.explain`.
+
+        Parameters
+        ----------
+        element : int
+            Number of the element in its block.
+        block : str, optional
+            Name of the block; may be left out if there is one.
+
+        Returns
+        -------
+        Explanation
+            Values at the quadrature points, and the first operation without a value.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such block; a KeyError.
+        StudyError
+            The block is not named, or the mesh is distributed.
+        ArgumentError
+            There is no such element.
+        """
+        return explain_element(self.system, self.problem, self.point.solution.x, element, block)
 
     def at_nodes(self, block: str, *, recovery: str = "projection") -> dict[str, Array]:
         """Return the fields of a block at the nodes.

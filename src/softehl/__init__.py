@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from softehl.runtime.fit.jax_operation import Operation
     from softehl.runtime.fit.least_squares import Fit
     from softehl.runtime.fit.objective import Objective
+    from softehl.runtime.kernels.explanation import ElementState, Explanation
     from softehl.runtime.kernels.kernel import Kernel
     from softehl.runtime.kernels.kernel_call import ArgumentError
     from softehl.runtime.kernels.shared_library import KernelError
@@ -121,6 +122,7 @@ _PUBLIC = {
     "ElementBlock": "softehl.runtime.discretisation.element_blocks",
     "EnergyGain": "softehl.runtime.analyses.motion",
     "Euler": "softehl.runtime.analyses.time_integrators",
+    "Explanation": "softehl.runtime.kernels.explanation",
     "FilmState": "softehl.cases.seal.states.state",
     "FirstOrderIntegrator": "softehl.runtime.analyses.time_integrators",
     "Fit": "softehl.runtime.fit.least_squares",
@@ -224,6 +226,7 @@ __all__ = [
     "ElementBlock",
     "EnergyGain",
     "Euler",
+    "Explanation",
     "Fields",
     "FilmState",
     "FirstOrderIntegrator",
@@ -409,3 +412,16 @@ def load_kernel(
 from softehl.runtime.definition import page_loader  # noqa: E402, after __path__ is complete
 
 page_loader.load_page = load_kernel  # the runtime has no compiler
+
+from softehl.runtime.kernels import page_evaluator  # noqa: E402
+
+
+def _evaluate_page(
+    folder: Path, kernel: str, state: "ElementState"
+) -> "tuple[list[tuple[str, tuple[float, ...], str]], str]":
+    with with_sympy():
+        from softehl.codegen.tools.page_evaluation import evaluate
+    return evaluate(folder, kernel, state)
+
+
+page_evaluator.evaluate_page = _evaluate_page
