@@ -16,7 +16,7 @@ from mpmath.libmp import NoConvergence
 
 from softehl.codegen.graph.differentiation import gradient
 from softehl.codegen.graph.evaluation import State, Walk
-from softehl.codegen.graph.graph import BOOLEAN, Input, Node, Op, Routine
+from softehl.codegen.graph.graph import BOOLEAN, Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.routines import Newton
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
@@ -97,14 +97,12 @@ class _Evaluation:
 
     def _solutions(self) -> dict[str, list[Node]]:
         """Solutions of local equations by their array of placeholders."""
-        found: dict[str, list[Node]] = {}
-        for s in self.d.statements:
-            for n in reachable([s.value]):
-                if n.op is Op.ITEM and isinstance(n.args[0].payload, Newton):
-                    items = found.setdefault(f"local {n.args[0].payload.name}", [])
-                    if n not in items:
-                        items.append(n)
-        return {k: sorted(v, key=lambda n: n.payload.index) for k, v in found.items()}  # type: ignore[union-attr]
+        solutions: dict[str, dict[int, Node]] = {}
+        for n in reachable([s.value for s in self.d.statements]):
+            if isinstance(n.payload, ResultIndex) and isinstance(n.args[0].payload, Newton):
+                items = solutions.setdefault(f"local {n.args[0].payload.name}", {})
+                items[n.payload.index] = n
+        return {array: [items[k] for k in sorted(items)] for array, items in solutions.items()}
 
     def _at_solution(self, n: Node, solutions: Mapping[str, Sequence[Node]]) -> tuple[float, ...]:
         """Values of what stands inside local equations, at their solution."""
