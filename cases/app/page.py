@@ -81,12 +81,16 @@ CHOICES = (
     Choice("oil", "Oil", "HLP 46", _OILS),
     Choice("temperature", "Temperature", "40 degC", [f"{t} degC" for t in range(20, 101, 10)]),
     Choice(
-        *("sealed_pressure", "Sealed pressure", "10 bar"),
-        [f"{p} bar" for p in (1, 2, 6, 10, 16, 25, 40, 63, 100, 160)],
+        key="sealed_pressure",
+        label="Sealed pressure",
+        value="10 bar",
+        options=[f"{p} bar" for p in (1, 2, 6, 10, 16, 25, 40, 63, 100, 160)],
     ),
     Choice(
-        *("roughness", "Surface of the seal", "smooth"),
-        ["smooth", *(f"Ra {height}" for height in (0.1, 0.2, 0.4, 0.8))],
+        key="roughness",
+        label="Surface of the seal",
+        value="smooth",
+        options=["smooth", *(f"Ra {height}" for height in (0.1, 0.2, 0.4, 0.8))],
     ),
     Choice("gland", "Gland", "hydraulic", ["hydraulic", "pneumatic"]),
 )

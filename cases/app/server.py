@@ -98,9 +98,10 @@ class Files(AuthRequestHandler):
 
     async def _report(self, folders: list[str], target: Path) -> None:
         """`softehl report`, in a process of its own."""
-        command = [sys.executable, "-m", "softehl", "report", *folders, "--xlsx"]
         process = await asyncio.create_subprocess_exec(
-            *(*command, "--out", str(target / "report.html")),
+            sys.executable,
+            *["-m", "softehl", "report", *folders],
+            *["--xlsx", "--out", str(target / "report.html")],
             stdout=asyncio.subprocess.DEVNULL,
             stderr=asyncio.subprocess.PIPE,
         )

@@ -90,7 +90,7 @@ def _draw(path: Path, response: Response, results: Sequence[Column]) -> None:
     figure = Figure(figsize=(3.6 * wide, 2.7 * high), layout="constrained")
     panels = figure.subplots(high, wide, sharex=True, squeeze=False).ravel()
     for axes, column in zip(panels, results, strict=False):
-        legend = draw_panel(axes, response, column)
+        handles, labels = draw_panel(axes, response, column)
         axes.set_ylabel(f"{column.head} [{column.unit}]" if column.unit else column.head)
         axes.grid(alpha=0.35)
     for axes in panels[len(results) :]:
@@ -98,7 +98,7 @@ def _draw(path: Path, response: Response, results: Sequence[Column]) -> None:
     for axes in panels[max(0, len(results) - wide) : len(results)]:
         axes.set_xlabel(titled(response.key, response.keys[response.key]))
         axes.tick_params(labelbottom=True)
-    figure.legend(*legend, loc="outside upper center", ncols=4, fontsize="small")
+    figure.legend(handles, labels, loc="outside upper center", ncols=4, fontsize="small")
     with replacing(path) as temporary:
         figure.savefig(temporary, format="png", dpi=120)
 
@@ -121,7 +121,8 @@ def draw_panel(axes: Axes, response: Response, column: Column) -> tuple[list[Any
             "marker": _MARKERS[states.index(state)] if others and state else ".",
             "linestyle": "-" if other and len(points) > 1 else "",
         }
-        axes.plot(*zip(*points, strict=True), alpha=0.7, linewidth=0.8, markersize=4, **look)
+        abscissas, heights = [x for x, _ in points], [y for _, y in points]
+        axes.plot(abscissas, heights, alpha=0.7, linewidth=0.8, markersize=4, **look)
     handles = [Line2D([], [], color=c, marker=".", linestyle="") for c in colours.values()]
     labels = list(colours)
     if others:

@@ -76,7 +76,7 @@ def _solve(
             else outcome
             for outcome, reporter in zip(outcomes, reporters, strict=True)
         ]
-    return [run.solve(*pair) for pair in zip(pieces, reporters, strict=True)]
+    return [run.solve(piece, reporter) for piece, reporter in zip(pieces, reporters, strict=True)]
 
 
 @dataclass

@@ -165,7 +165,7 @@ def named(
             _require_plain(name, case)
         return dict(zip(cases, pairs, strict=True))
     pairs = [(case_of(parameters), parameters) for parameters in cases]
-    named_pairs = {_name(*pair): pair for pair in pairs}
+    named_pairs = {_name(case, parameters): (case, parameters) for case, parameters in pairs}
     if len(named_pairs) < len(pairs):
         raise BadInput("two curves would have the same folder; allowed: a dict of named cases")
     return named_pairs

@@ -152,8 +152,8 @@ def leakage(store: Store, scope: Scope) -> Product:
             axes.plot(u, net, color=color, label=f"$p_s$ = {p.sealed_pressure:g} MPa")
             for r in selected:
                 face = color if r.verdict == "ok" else "white"
-                point = ([r.speed_mm_s], [r.net_film_um])
-                axes.plot(*point, marker="o", color=color, markerfacecolor=face)
+                x, y = [r.speed_mm_s], [r.net_film_um]
+                axes.plot(x, y, marker="o", color=color, markerfacecolor=face)
         axes.set_xscale("log")
         axes.set_xlabel("rod speed $|U|$ [mm/s]")
         axes.set_ylabel(r"$h^*_\mathrm{out} - h^*_\mathrm{in}$ [$\mu$m]")

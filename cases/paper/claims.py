@@ -221,14 +221,14 @@ def _dg_agrees(query: Query) -> Finding:
 
 def _solids(query: Query) -> Finding:
     densities, value = query.scope.meshes((1, 2, 4)), _converged(query)
-    rows = [
+    taylor, fbar = (
         [100 * (query.h(d, 1.0, 400.0, solid=s) / value - 1) for d in densities]
         for s in ("taylor", "fbar")
-    ]
-    text = f"errors of h* at densities {numbers(densities)}: Taylor {numbers(rows[0], '+.2f')} %, "
-    pairs = [(abs(a), abs(b)) for a, b in zip(*rows, strict=True)]
+    )
+    text = f"errors of h* at densities {numbers(densities)}: Taylor {numbers(taylor, '+.2f')} %, "
+    pairs = [(abs(a), abs(b)) for a, b in zip(taylor, fbar, strict=True)]
     comparison = counted(pairs, "Taylor closer")
-    return Finding(f"{text}F-bar {numbers(rows[1], '+.2f')} %; {comparison.text}", comparison.holds)
+    return Finding(f"{text}F-bar {numbers(fbar, '+.2f')} %; {comparison.text}", comparison.holds)
 
 
 def _solids_oscillate_alike(query: Query) -> Finding:
@@ -295,7 +295,7 @@ MESH: tuple[tuple[str, str, Measure], ...] = (
 )
 
 
-_LAYERS = (5.0, 20.0)
+_LOW, _HIGH = 5.0, 20.0
 """Film thicknesses between which the inclination is taken, um."""
 
 
@@ -315,16 +315,14 @@ def _pressure_unknowns(query: Query) -> Finding:
 
 def _zone_expands(query: Query) -> Finding:
     density = query.scope.mesh(2, 2)
-    limits = []
-    for p_s in query.scope.some_pressures(FIG_4_PRESSURES):
-        row = query.row(density, p_s, 400.0)
-        limits.append((row.contact_start_mm, row.contact_end_mm))
-    starts, stops = zip(*limits, strict=True)
+    pressures = query.scope.some_pressures(FIG_4_PRESSURES)
+    rows = [query.row(density, p_s, 400.0) for p_s in pressures]
+    starts, stops = [r.contact_start_mm for r in rows], [r.contact_end_mm for r in rows]
     moved = (max(starts) - min(starts), stops[-1] - stops[0])
     text = f"air end {numbers(stops)} mm, sealed end {numbers(starts)} mm over p_s"
-    if len(limits) < 2:
+    if len(rows) < 2:
         return Finding(text, None)
-    return Finding(text, list(stops) == sorted(stops) and moved[0] < 0.25 * moved[1])
+    return Finding(text, stops == sorted(stops) and moved[0] < 0.25 * moved[1])
 
 
 def _minimum_at_outlet(query: Query) -> Finding:
@@ -360,8 +358,8 @@ def _inclination(query: Query) -> Finding:
             profile = query.state(query.density, p_s, sign * 100.0).profile
             x, h = profile.x_mm, profile.h_um
             low = int(np.argmin(h))
-            angles.append(angle(x[: low + 1][::-1], h[: low + 1][::-1], *_LAYERS))
-            angles.append(angle(x[low:], h[low:], *_LAYERS))
+            angles.append(angle(x[: low + 1][::-1], h[: low + 1][::-1], low=_LOW, high=_HIGH))
+            angles.append(angle(x[low:], h[low:], low=_LOW, high=_HIGH))
     holds = all(10.0 <= a <= 15.0 for a in angles)
     text = f"p_s 1: out {numbers(angles[:2])}, in {numbers(angles[2:4])}; p_s 2: out "
     text += (
@@ -548,11 +546,9 @@ def _piezo_pressure(query: Query) -> Finding:
     d, errors = query.density, []
     for sign in (1.0, -1.0):
         query.row(d, 5.0, sign * 100.0)
-        pair = (
-            query.state(d, 5.0, sign * 100.0, pressure_viscosity=0.0),
-            query.state(d, 5.0, sign * 100.0),
-        )
-        errors.append(difference(*pair, margin=0.1) / query.row(d, 5.0, sign * 100.0).p_max_MPa)
+        constant = query.state(d, 5.0, sign * 100.0, pressure_viscosity=0.0)
+        change = difference(constant, query.state(d, 5.0, sign * 100.0), margin=0.1)
+        errors.append(change / query.row(d, 5.0, sign * 100.0).p_max_MPa)
     percent = numbers([100 * x for x in errors], ".2g")
     text = f"largest difference in the mid contact {percent} % of p_max"
     return Finding(text, max(errors) < 0.01)
@@ -620,7 +616,7 @@ class Statement:
     measure: Callable[[Query], Finding]
 
 
-STATEMENTS = tuple(Statement(*entry) for entry in FINDINGS)
+STATEMENTS = tuple(Statement(reference, text, measure) for reference, text, measure in FINDINGS)
 
 
 def _requests(scope: Scope) -> list[Request]:

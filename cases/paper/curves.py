@@ -151,7 +151,11 @@ def fig_18(scope: Scope) -> Chart:
     """h* over density for the rules of Gauss and Lobatto."""
     series = [
         _over_density(
-            *(scope, f"{rule}, $m_p$ = {m}", panel, i, style),
+            scope,
+            f"{rule}, $m_p$ = {m}",
+            panel=panel,
+            shade=i,
+            style=style,
             reynolds=kind,
             quadrature=rule,
             pressure_order=m,

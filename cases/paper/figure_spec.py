@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from softehl.cases.paper.states import SPEEDS, Request, RequestedState, Store
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import DENSITIES
@@ -125,8 +127,8 @@ def profile_table(series: Sequence[tuple[str, RequestedState]]) -> CsvTable:
     for label, state in series:
         if state.usable:
             profile = state.profile
-            columns = (profile.x_mm.tolist(), profile.h_um.tolist(), profile.p_MPa.tolist())
-            rows += [(label, state.verdict, *row) for row in zip(*columns, strict=True)]
+            values = np.column_stack([profile.x_mm, profile.h_um, profile.p_MPa]).tolist()
+            rows += [(label, state.verdict, *row) for row in values]
     return CsvTable(PROFILE_HEADER, rows)
 
 

@@ -77,7 +77,8 @@ def _row(store: Store, state: RequestedState) -> list[Cell]:
     dry, film = nan, nan
     contact = store.contact(ring)
     if contact is not None:
-        dry = film_of(largest_inlet_gradient(*contact, ring, u > 0), u)
+        x, p = contact
+        dry = film_of(largest_inlet_gradient(x, p, ring, u > 0), u)
     if state.usable:
         profile = state.profile
         film = film_of(largest_inlet_gradient(profile.x_mm, profile.p_MPa, ring, u > 0), u)

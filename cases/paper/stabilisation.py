@@ -44,8 +44,14 @@ def stabilisation(store: Store, scope: Scope) -> Product:
         paper, stabilised = setup(density, p_s), setup(density, p_s, **STABILISED)
         reference = setup(_finest(scope), p_s, **STABILISED)
         for u in both(scope.some_speeds()):
-            states = [store.state(which, u) for which in (paper, stabilised, reference)]
-            rows.append(_row(p_s, u, *states))
+            row = _row(
+                p_s,
+                u,
+                paper=store.state(paper, u),
+                stabilised=store.state(stabilised, u),
+                reference=store.state(reference, u),
+            )
+            rows.append(row)
     header = (
         *("sealed_pressure_MPa", "rod_speed_mm_s"),
         *("h_star_paper_um", "error_percent", "oscillation", "verdict"),

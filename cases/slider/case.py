@@ -140,9 +140,9 @@ class SliderCase(RowByRow[Slider, SliderRow]):
             return results(problem, solution)
 
         half = parameters.model_copy(update={"segments": parameters.segments // 2})
-        coarser = self.solution(half, key)
+        coarse_problem, coarse_solution = self.solution(half, key)
         row, profile = results_of(parameters, problem, solution)
-        other, _ = results_of(half, *coarser)
+        other, _ = results_of(half, coarse_problem, coarse_solution)
         fine, coarse = (np.array([r.flux_mm2_s, r.load_N_per_mm]) for r in (row, other))
         error = 100.0 / 3.0 * float((np.abs(coarse - fine) / np.maximum(np.abs(fine), 1e-99)).max())
         verdict = OK if error <= 2.0 else "coarse"

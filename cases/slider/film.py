@@ -90,7 +90,8 @@ class GapFilm:
         arguments = {name: value for name, value in values.items() if name in flow.parameters}
         study.add(FILM, flow, along=along, rule=rule, **arguments)
         study.add(
-            *("cavitation", load_kernel("film_void")),
+            "cavitation",
+            load_kernel("film_void"),
             on=np.empty((len(each), 0), np.int64),
             called={"p": PRESSURE, "v": VOID},
             along={PRESSURE: each[:, None], VOID: each[:, None]},
@@ -174,9 +175,15 @@ def beyond_front(x: Array, p: Array, front: float) -> float:
 def strip_of(p: Slider, alpha: float) -> GapFilm:
     """The film of a slider that conserves mass; alpha: coefficient of Barus' law."""
     surfaces = SurfacePair.of(p.roughness, p.asperity_stiffness, p.boundary_friction)
-    thinning = p.film_suffix, p.thinning_values(p.viscosity)
-    oil = FilmOil(p.viscosity, alpha, p.cavitation_pressure, *thinning)
-    return GapFilm(*p.segment_ends, p.pressure_order, oil, surfaces)
+    oil = FilmOil(
+        viscosity=p.viscosity,
+        alpha=alpha,
+        cavitation_pressure=p.cavitation_pressure,
+        suffix=p.film_suffix,
+        thinning=p.thinning_values(p.viscosity),
+    )
+    x, h = p.segment_ends
+    return GapFilm(x, h, order=p.pressure_order, oil=oil, surfaces=surfaces)
 
 
 def conserving_problem(p: Slider, speed: float, alpha: float) -> Problem:

@@ -89,7 +89,11 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
         return _outcome(p, Status.MAX_ITERATIONS, message)
     corrector = replace(film_corrector(p, linear), stale=_STALE)
     march = March(
-        *(film.system, motion, film.loads, corrector, film_layer(film.system, film.x)),
+        system=film.system,
+        motion=motion,
+        film=film.loads,
+        corrector=corrector,
+        layer=film_layer(film.system, film.x),
         tolerance=parameters.time_tolerance,
         integrator=BDF2() if parameters.time_order == 2 else Euler(),
         returned=parameters.supply == "returned",

@@ -29,7 +29,8 @@ class TimeTable:
     @classmethod
     def of(cls, rows: Rows, key: str = "motion") -> TimeTable:
         """From rows (time, value) of a key.  ValueError for times that do not rise from 0."""
-        times, values = (tuple(float(v) for v in column) for column in zip(*rows, strict=True))
+        times = tuple(float(time) for time, _ in rows)
+        values = tuple(float(value) for _, value in rows)
         if times[0] != 0.0 or len(times) < 2 or not np.all(np.diff(times) > 0.0):
             times_text = ", ".join(f"{t:g}" for t in times[:4]) + ", ..." * (len(times) > 4)
             raise ValueError(f"{key}: times {times_text}: at least two, rising from 0, in seconds")

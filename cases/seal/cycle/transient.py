@@ -338,9 +338,9 @@ def unpacked(march: March, table: Mapping[str, Array]) -> None:
 
 def repeated(march: March, loop: Mapping[str, Array]) -> list[Reading]:
     """The readings of a cycle from its table; what its outstrokes left is on the rod again."""
-    names = [field.name for field in fields(Reading)]
-    rows = zip(*(loop[name].tolist() for name in names), strict=True)
-    past = [Reading(*row) for row in rows]
+    columns = {field.name: loop[field.name].tolist() for field in fields(Reading)}
+    count = len(columns["t_s"])
+    past = [Reading(**{name: c[k] for name, c in columns.items()}) for k in range(count)]
     for reading in past:
         march.deposit(reading)
     return past

@@ -248,9 +248,14 @@ def _contact_constants(
     """Constants (n,) of contact elements by these names; none of other blocks."""
     if block.group != "contact":
         return {}
-    chain = section.chains[block.elements]
-    stiffness, obstacle = section.node_moduli(p)[chain[0]], obstacles_of(p)[block.name]
-    values = contact_data(obstacle, section.mesh.points, *chain, stiffness)
+    nodes, segments = section.chains[block.elements]
+    values = contact_data(
+        obstacles_of(p)[block.name],
+        section.mesh.points,
+        nodes=nodes,
+        segments=segments,
+        stiffness=section.node_moduli(p)[nodes],
+    )
     constants = dict(zip(("n_z", "n_r", "c", "area", "rho"), values.T, strict=True))
     return {name: value for name, value in constants.items() if name in names}
 
@@ -285,12 +290,12 @@ class SealSystem(SealUnknowns):
         present = blocks_of(p)
         built = seal_study(p, section, present).system(NUMBERED)
         numbering = built.numbering
-        cells = section.coordinates("cells"), numbering.at(MOVED, section.mesh.quads)
+        corners, dofs = section.coordinates("cells"), numbering.at(MOVED, section.mesh.quads)
         at_rest = replace(
             built.resting(),
             scales={f.name: f.scale(p) for f in FIELDS if f.name in numbering.layout.names},
             absolute=True,
-            guards=(KeepsOrientation(*cells),),
+            guards=(KeepsOrientation(corners, dofs),),
         )
         switched_off = {block.name: None for block in present if block.of_film}
         system = cls(

@@ -158,7 +158,7 @@ class Arc:
             if turn < abs(self.sweep):
                 z, r = ((1, 0), (0, 1), (-1, 0), (0, -1))[k]
                 points.append((self.centre[0] + self.radius * z, self.centre[1] + self.radius * r))
-        z_all, r_all = zip(*points, strict=True)
+        z_all, r_all = [z for z, _ in points], [r for _, r in points]
         return min(z_all), min(r_all), max(z_all), max(r_all)
 
 
@@ -206,7 +206,7 @@ def _fillet(
     if radius == 0.0:
         return 0.0, None, at
     a, b = np.subtract(at, previous), np.subtract(after, at)
-    a, b = a / np.hypot(*a), b / np.hypot(*b)
+    a, b = a / np.hypot(a[0], a[1]), b / np.hypot(b[0], b[1])
     turn = atan2(a[0] * b[1] - a[1] * b[0], float(a @ b))
     if abs(turn) < _STRAIGHT or abs(turn) > _BACK:
         return 0.0, None, at

@@ -60,8 +60,15 @@ def _round_mesh(
     bottom = float(outline.position(np.array([[z, r - radius]]))[0])
     begin = (film[0] - bottom + half) % outline.length - half
     end = begin + (film[1] - film[0]) % outline.length
-    angles = degrees(begin / radius), degrees(end / radius)
-    disc = Disc(z, r, radius, *angles, spacing=sizes.spacing, long=sizes.long)
+    disc = Disc(
+        centre_z=z,
+        centre_r=r,
+        radius=radius,
+        arc_start=degrees(begin / radius),
+        arc_end=degrees(end / radius),
+        spacing=sizes.spacing,
+        long=sizes.long,
+    )
     if sizes.depth is not None:
         disc = fine_disc(disc, sizes.depth, sizes.first)
     mesh = disc_mesh(disc, density)

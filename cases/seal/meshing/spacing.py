@@ -90,6 +90,6 @@ def graded(
         size = np.minimum(coarsest, np.min(targets, axis=0))
         return np.asarray(cumulative_trapezoid(1.0 / size, s, initial=0))
 
-    bounds = np.log(1e-6 * coarsest), np.log(coarsest)
-    index = segments(brentq(lambda finest: segments(finest)[-1] - count, *bounds))
+    lower, upper = np.log(1e-6 * coarsest), np.log(coarsest)
+    index = segments(brentq(lambda finest: segments(finest)[-1] - count, lower, upper))
     return Spacing.of(s, index)

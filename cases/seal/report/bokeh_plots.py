@@ -77,9 +77,11 @@ def curve_plot(runs: Sequence[FinishedRun]) -> Any:
 
 def friction_plot(runs: Sequence[FinishedRun]) -> Any:
     """Magnitude of the friction on the rod over speed."""
-    return _over_speed(
-        *(runs, style.FRICTION), lambda r: (abs(r.rod_friction_N), r.rod_friction_error_percent)
-    )
+
+    def friction(row: FilmRow) -> tuple[float, float]:
+        return abs(row.rod_friction_N), row.rod_friction_error_percent
+
+    return _over_speed(runs, style.FRICTION, friction)
 
 
 def _over_speed(

@@ -43,7 +43,7 @@ def loop_figure(loops: Mapping[str, Columns], work: Sequence[float]) -> Figure:
     shades, last_point = np.linspace(0.25, 1.0, len(loops) + 1)[1:], np.empty((2, 0))
     for shade, energy, (label, loop) in zip(shades, work, loops.items(), strict=True):
         line = np.hstack([last_point, [loop["place_mm"], loop["friction_N"]]])
-        axes.plot(*line, color="#1b6ca8", alpha=shade, label=f"{label}: {energy:.4g} mJ")
+        axes.plot(line[0], line[1], color="#1b6ca8", alpha=shade, label=f"{label}: {energy:.4g} mJ")
         last_point = line[:, -1:]
     axes.axhline(0.0, color="0.4", linewidth=0.7)
     axes.set(xlabel=_PLACE, ylabel=style.FRICTION)

@@ -61,7 +61,9 @@ def _draw_lines(axes: Axes, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]
     _draw_slope(axes, rows)
     for stroke, selected in style.by_stroke(rejected).items():  # crosses on the lower axis
         axes.plot(
-            *([abs(row.rod_speed_mm_s) for row in selected], [0.02] * len(selected), "x"),
+            [abs(row.rod_speed_mm_s) for row in selected],
+            [0.02] * len(selected),
+            "x",
             color=style.COLOURS[stroke],
             transform=axes.get_xaxis_transform(),
             label=f"{style.STROKES[stroke]}, film collapsed: no result",
@@ -126,7 +128,9 @@ def _draw_film_curve(axes: Axes, stroke: str, rows: Sequence[FilmRow]) -> None:
         if row.verdict == OK:
             continue
         position = abs(row.rod_speed_mm_s), row.h_star_um
-        axes.plot(*position, style.MARKERS[stroke], color=colour, markerfacecolor="white")
+        axes.plot(
+            position[0], position[1], style.MARKERS[stroke], color=colour, markerfacecolor="white"
+        )
         shift = (-5, 4) if stroke == "out" else (5, -4)
         style.write_beside(axes, position, row.verdict, shift, color=colour)
 
@@ -247,7 +251,9 @@ def _draw_friction(
         for axes in (friction, fractions):
             axes.axvline(position, color=colour, linestyle=":", linewidth=1.0)
         friction.text(
-            *(position, 0.98, f"{words} "),
+            x=position,
+            y=0.98,
+            s=f"{words} ",
             transform=friction.get_xaxis_transform(),
             rotation=90,
             ha="right" if stroke == "out" else "left",

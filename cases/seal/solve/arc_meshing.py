@@ -93,10 +93,13 @@ def _placed(system: SealSystem, x: Array, layout: Layout) -> Layout:
     """The layout with an arc that reaches as far as a film may matter in the contact state x."""
     seen, p = system.section.layout, system.parameters
     arc_ends = _way_out(system, x, 0), _way_out(system, x, 1)
-    pressing = system.pressing(ROD, x), system.pressing(BORE, x)
-    return layout.between(
-        seen.with_sealed_ends(system.mesh, *pressing, p.sealed_pressure), arc_ends
+    sealed = seen.with_sealed_ends(
+        system.mesh,
+        rod=system.pressing(ROD, x),
+        housing=system.pressing(BORE, x),
+        p_s=p.sealed_pressure,
     )
+    return layout.between(sealed, arc_ends)
 
 
 def _edge_spot(system: SealSystem, x: Array, p: Gland, arc_bounds: tuple[float, float]) -> Spot:

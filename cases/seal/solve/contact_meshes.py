@@ -141,15 +141,17 @@ class ContactMeshes:
     def _sealed(self, p: Seal, state: State) -> State:
         """On a mesh whose arc and whose sealed pressure end well, of a few that are made for it."""
         for _ in range(CYCLES - 1):
-            if p.given_arc or not (unsealed(*state) or on_wall(*state)):
+            system, x = state
+            if p.given_arc or not (unsealed(system, x) or on_wall(system, x)):
                 break
             state = self._next(state, p)
         return state
 
     def _next(self, state: State, p: Seal) -> State:
         """On a mesh that is made for the contact on another one."""
-        system = build_system(p, contact_layout(*state, p))
-        return self.solver.from_mesh(*state, system, "contact on a graded mesh")
+        old, x = state
+        system = build_system(p, contact_layout(old, x, p))
+        return self.solver.from_mesh(old, x, system, name="contact on a graded mesh")
 
     def _first_state(self, system: SealSystem) -> Array:
         """Unknowns (n,) on the first mesh: a stored state if there is a good one, else the path."""

@@ -86,9 +86,15 @@ class Judge:
             reservation=reservation(p, estimate) if adapted.fits else UNFIT,
         )
         friction_known = film.numbers.friction_known
-        equations = film.system, film.problem, film.loads, film.x
         state = replace(
-            film_state(*equations, verdict, film.solution.iterations),
+            film_state(
+                film.system,
+                film.problem,
+                film.loads,
+                x=film.x,
+                verdict=verdict,
+                iterations=film.solution.iterations,
+            ),
             h_star_error_percent=error,
             rod_friction_error_percent=estimate.friction if estimate and friction_known else nan,
         )

@@ -54,17 +54,19 @@ def carried_contact(
 
 def carried_unknowns(old: SealSystem, new: SealSystem, x: Array) -> Array:
     """Every field that contact knows, (n',), on another mesh; those of the film are zero."""
-    y, meshes = new.at_rest(), (old.mesh, new.mesh)
+    y = new.at_rest()
     for field in old.contact_fields():
         values = x[old.layout.part(field.name)]
         if field.on == "nodes":
-            values = transfer_nodes(*meshes, values.reshape(-1, 2)).ravel()
+            values = transfer_nodes(old.mesh, new.mesh, values.reshape(-1, 2)).ravel()
         elif field.on != "section":
             old_nodes, new_nodes = (system.section.chains[field.on][0] for system in (old, new))
             if len(old_nodes) == len(old.mesh.boundary):
-                values = transfer_boundary(*meshes, values)
+                values = transfer_boundary(old.mesh, new.mesh, values)
             else:
-                values = transfer_chain(*meshes, old_nodes, new_nodes, values)
+                values = transfer_chain(
+                    old.mesh, new.mesh, nodes=old_nodes, new_nodes=new_nodes, values=values
+                )
         y[new.layout.part(field.name)] = values
     return y
 

@@ -69,8 +69,9 @@ class Estimate:
     @property
     def friction_bound(self) -> float:
         """Largest error of friction, by its two parts."""
-        parts = [(k.drag, k.friction - k.drag) for k in (self.film, self.other)]
-        difference = fsum(abs(a - b) for a, b in zip(*parts, strict=True))
+        film, other = self.film, self.other
+        rubbed = (film.friction - film.drag) - (other.friction - other.drag)
+        difference = fsum((abs(film.drag - other.drag), abs(rubbed)))
         return self._factor * difference / abs(self.film.friction)
 
     @property

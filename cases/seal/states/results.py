@@ -68,11 +68,12 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         for tau in (0.5 * (at["tau_rod"] + at["tau"]), at["tau_rod"])
     )
     flow = float(film.along(at["eta"].ravel())[0]) * film.speed
-    inlet_wedge = wedge(system, film.stroke, x)
-    exit_wedge = wedge(system, "in" if film.stroke == "out" else "out", x)
-    entrance = built_up(*inlet_wedge, flow, h_star)
-    sliding, rubbed = wedge_friction(system, *inlet_wedge, flow, h_star)
-    beyond = wedge_friction(system, *exit_wedge, flow, h_star)[0]  # no pressure is built up there
+    distance, gap = wedge(system, film.stroke, x)
+    entrance = built_up(distance, gap, flow=flow, h_star=h_star)
+    sliding, rubbed = wedge_friction(system, distance, gap, flow=flow, h_star=h_star)
+    distance, gap = wedge(system, "in" if film.stroke == "out" else "out", x)
+    # no pressure is built up there
+    beyond, _ = wedge_friction(system, distance, gap, flow=flow, h_star=h_star)
     if film.entrance:
         drag += copysign(sliding, film.rod_speed)
         friction += copysign(rubbed, film.rod_speed)

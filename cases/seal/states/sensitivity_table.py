@@ -42,9 +42,14 @@ def resolved(row: FilmRow) -> bool:
 
 def rows_of(row: FilmRow, sensitivities: Mapping[str, Mapping[str, float]]) -> list[SensitivityRow]:
     """The lines of a state in `sensitivity.csv`."""
-    operating_point = row.sealed_pressure_MPa, row.rod_speed_mm_s
     return [
-        SensitivityRow(*operating_point, quantity, name, slope)
+        SensitivityRow(
+            sealed_pressure_MPa=row.sealed_pressure_MPa,
+            rod_speed_mm_s=row.rod_speed_mm_s,
+            quantity=quantity,
+            parameter=name,
+            log_derivative=slope,
+        )
         for quantity, log_derivatives in sensitivities.items()
         for name, slope in log_derivatives.items()
     ]

@@ -49,7 +49,7 @@ def run_summary(rows: Sequence[FilmRow], travel: float, stroke: str = "both") ->
         at = row.sealed_pressure_MPa, abs(row.rod_speed_mm_s)
         strokes.setdefault(at, {})[row.stroke] = row
     points = sorted(strokes, key=lambda at: (at[0], -at[1]))
-    speeds = [_Speed(*at, strokes[at], nets.get(at)) for at in points]
+    speeds = [_Speed(p_s, u, strokes[p_s, u], nets.get((p_s, u))) for p_s, u in points]
     first = _whether(speeds, travel)
     if stroke != "both" and not nets:
         first = f'{stroke}stroke alone, as asked for; leakage needs stroke = "both"'

@@ -312,8 +312,9 @@ class Verdict:
             return ""
         if abs(film.drag) > abs(last.drag):
             return "the drag on the rod rises while the speed falls"
-        both = last.speed, last.h_star, film.speed, film.h_star
-        if not min(both) > 0.0 or local_exponent(*both) > LARGEST_EXPONENT:
+        if not min(last.speed, last.h_star, film.speed, film.h_star) > 0.0:
+            return "its thickness falls too fast with the speed"
+        if local_exponent(last.speed, last.h_star, film.speed, film.h_star) > LARGEST_EXPONENT:
             return "its thickness falls too fast with the speed"
         return ""
 

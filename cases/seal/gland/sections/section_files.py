@@ -86,7 +86,7 @@ def _converted(entity: Any) -> Iterator[Piece]:
         angle_pairs = (
             [(d.start_angle, d.end_angle)] if kind == "ARC" else [(0.0, 180.0), (180.0, 360.0)]
         )
-        arcs = [_arc(entity, *angles) for angles in angle_pairs]
+        arcs = [_arc(entity, start, end) for start, end in angle_pairs]
         mirrored_view = d.hasattr("extrusion") and d.extrusion.z < 0.0
         yield from (map(mirrored, arcs) if mirrored_view else arcs)
     else:
