@@ -44,28 +44,22 @@ def results(interface: ElementInterface, task: str) -> list[Array]:
     s = c_interface.sizes(interface)
     n = s["UNKNOWNS"]
     residual = Array("residual", (n,), "internal minus external forces")
-    rows = {
+    rows: dict[str, list[Array]] = {
         Task.ENERGY: [Array("energy", (), "potential")],
         Task.RESIDUAL: [residual],
         Task.TANGENT: [residual, Array("tangent", (n, n), "d residual(i) / d u(j)")],
         Task.FIELDS: [Array("fields", (s["FIELDS"], s["POINTS"]), "fields of the points")],
         Task.PRODUCT: [Array("product", (n,), "tangent times direction")],
     }
-    by = task.removeprefix("d_")
-    return rows.get(Task(task) if task in set(Task) else None, []) or [
-        Array("slope", (n,), f"derivative of the residual by {by}")
-    ]
-
-
-DIRECTION = "direction"
-"""Name of the further argument of task `product`."""
+    slope = Array("slope", (n,), f"derivative of the residual by {task.removeprefix('d_')}")
+    return rows.get(task, [slope])
 
 
 def direction(interface: ElementInterface, task: str) -> list[Array]:
     """Further inputs of a task."""
     if task != Task.PRODUCT:
         return []
-    return [Array(DIRECTION, (len(interface.definition.unknowns),), "a vector")]
+    return [Array("direction", (len(interface.definition.unknowns),), "a vector")]
 
 
 def sample_text(interface: ElementInterface, references: Sequence[Sample]) -> str:
