@@ -36,6 +36,7 @@ INNER = {
             "Affine",
             "Call",
             "CellOptions",
+            "Constraints",
             "Located",
             "NewtonState",
             "Pattern",

@@ -10,8 +10,8 @@ import numpy as np
 from softehl.log import warn
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.discretisation.constraints import Constraints, symmetric
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.reduced_tangent import CondensedMap, symmetric
 from softehl.runtime.equations.system import System
 from softehl.runtime.results.result import ModeShape, Result
 from softehl.runtime.solve.eigen import nearest_zero
@@ -154,9 +154,9 @@ def critical_point(problem: Problem, t: float, x: Array) -> CriticalPoint:
     """Of a problem at unknowns x, (n,), with the contacts that it has there."""
     contact_problem = problem.at(x)
     K = contact_problem.assembler.linearise(x, contact_problem.parameters)[1]
-    free = Constraints.of(contact_problem, K)
+    free = CondensedMap.of(contact_problem, K)
     value, mode = nearest_zero(symmetric(free.matrix(K)))
-    return CriticalPoint(t, x, value, free.map @ mode)
+    return CriticalPoint(t, x, value, free.expand(mode))
 
 
 def displacements(system: System, x: Array) -> Array:

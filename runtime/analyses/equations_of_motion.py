@@ -253,7 +253,7 @@ class EquationsOfMotion:
     def initial_accelerations(self, problem: Problem, x: Array) -> Array:
         """Initial accelerations (n,): M a = -f on free unknowns.  Raises StudyError."""
         forces = Forces.of(problem, x, self.roles)
-        free = self.comm.constraint_map(problem)
+        free = self.comm.constraints(problem)
         diagonal = free.gather(self.M.diagonal())
         inverse = 1.0 / np.where(diagonal > 0.0, diagonal, np.inf)
         solution = conjugate_gradients(

@@ -19,10 +19,10 @@ from softehl.runtime.analyses.motion import (
 from softehl.runtime.analyses.time_integrators import ROUNDING, CentralDifference
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.discretisation.communicator import ConstraintMap
-from softehl.runtime.discretisation.constraints import symmetric
+from softehl.runtime.discretisation.constraints import Constraints
 from softehl.runtime.discretisation.loads import Tie
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.reduced_tangent import symmetric
 from softehl.runtime.solve.eigen import highest
 from softehl.runtime.solve.solution import Branch, NotConverged, Point, Solution, Status
 
@@ -42,7 +42,7 @@ class ExplicitMarch:
     dt: float
     body: EquationsOfMotion
     state: MotionState
-    free: ConstraintMap
+    free: Constraints
     masses: Array
     integrator: CentralDifference
 
@@ -53,7 +53,7 @@ class ExplicitMarch:
         """From a state with velocities.  Raises StudyError where an unknown needs a mass."""
         problem = body.at_end(state.ended_step(dt), state.v)
         _require_lumped_masses(body, problem)
-        free = body.comm.constraint_map(problem)
+        free = body.comm.constraints(problem)
         march = cls(dt, body, state, free, free.gather(body.lumped_masses), integrator)
         a = march._accelerations(Forces.of(problem, state.x, body.roles).total)
         march.state = replace(state, a=a)

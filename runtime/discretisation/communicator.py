@@ -8,29 +8,18 @@ decision is made by `Communicator`, so that all processes decide alike.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.discretisation.constraints import Constraints, symmetric
+from softehl.runtime.discretisation.constraints import Constraints
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.reduced_tangent import CondensedMap, symmetric
 from softehl.runtime.solve.eigen import lowest, smallest_factors
 
 T = TypeVar("T")
-
-
-class ConstraintMap(Protocol):
-    """Free unknowns z of a problem: all change by T z; see `constraints.Constraints`."""
-
-    def gather(self, forces: Array) -> Array:
-        """T' f of forces of the elements of this process: own sums over all."""
-        ...
-
-    def expand(self, z: Array) -> Array:
-        """T z at the unknowns of this process."""
-        ...
 
 
 class Communicator:
@@ -81,9 +70,9 @@ class Communicator:
         """Product of vectors of which each process has own values."""
         return float(self.sum(np.array([a @ b]))[0])
 
-    def constraint_map(self, problem: Problem) -> ConstraintMap:
-        """Free unknowns of the equations of this process."""
-        return Constraints.of(problem)
+    def constraints(self, problem: Problem) -> Constraints:
+        """Constraints of the equations of this process, with free unknowns z of all processes."""
+        return problem.constraints
 
     def local_problem(self, distributed: Any) -> Problem:
         """Equations of this process of a distributed problem."""
@@ -97,20 +86,20 @@ class Communicator:
 
         problem: whose supports and ties hold. K, M: (n, n), of the elements of this process.
         """
-        free = Constraints.of(problem, K)
+        free = CondensedMap.of(problem, K)
         stiffness, mass = symmetric(free.matrix(K)), symmetric(free.matrix(M))
         values, vectors = lowest(stiffness, mass, count, free.saddle(K))
-        return values, np.asarray((free.map @ vectors.T).T)
+        return values, free.expand(vectors.T).T
 
     def buckling(
         self, problem: Problem, K: csc_array, G: csc_array, count: int
     ) -> tuple[Array, Array]:
         """Smallest positive f of (K + f G) x = 0, and vectors: `eigen.smallest_factors`."""
-        free = Constraints.of(problem, K)
+        free = CondensedMap.of(problem, K)
         factors, vectors = smallest_factors(
             symmetric(free.matrix(K)), symmetric(free.matrix(G)), count
         )
-        return factors, np.asarray((free.map @ vectors.T).T)
+        return factors, free.expand(vectors.T).T
 
     def with_other_elements(self) -> Communicator:
         """Communicator of the same unknowns for equations with other elements."""

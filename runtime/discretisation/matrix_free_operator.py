@@ -1,23 +1,30 @@
-"""Matrix-free tangent, and its solution by Krylov methods with multigrid."""
+"""Matrix-free tangent, and its solution by Krylov methods with multigrid.
+
+Conjugate gradients find z of T' A T, T of the constraints; the forces f of ties, whose equations
+are B x = c, follow from B' f = r - A x (`TieForces`).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array, csc_array, csr_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.discretisation.constraints import Ties
+from softehl.runtime.discretisation.constraints import Constraints, dependent_tie, tie_dofs
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Tie
 from softehl.runtime.discretisation.matrix_free_products import ElementProduct
 from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.solve.linear.coarse_grid_solver import coarse_solver
+from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.linear.krylov import conjugate_gradients, minimal_residuals
-from softehl.runtime.solve.linear.linear_solver import SingularMatrix
+from softehl.runtime.solve.linear.linear_solver import Factors, SingularMatrix
 from softehl.runtime.solve.linear.multigrid import MultigridCycle, MultigridLevel
 
 
@@ -30,6 +37,68 @@ class KrylovSettings:
     tolerance: float
     max_iterations: int
     counts: list[int] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class TieForces:
+    """All ties of a problem, maybe none, and what moves on every level.
+
+    matrix: (n, n) their part of the tangent. equations: B, (t, n), without prescribed unknowns, and
+    normal: factors of B B'. forces: (t,) numbers of the forces. constraints: of the unknowns, and
+    levels: of the unknowns of every level.
+    """
+
+    matrix: csr_array
+    equations: csr_array
+    normal: Factors | None
+    forces: Integers
+    constraints: Constraints
+    levels: tuple[Constraints, ...]
+
+    @classmethod
+    def of(cls, problem: Problem, levels: Sequence[Integers]) -> TieForces:
+        """Of a problem, for levels of unknowns of these numbers.
+
+        Raises ProblemError where a tie follows from others.
+        """
+        constraints, n = problem.constraints, problem.assembler.size
+        ties = tie_dofs(problem.assembler)
+        dependent = dependent_tie(ties, constraints.prescribed)
+        if dependent is not None:
+            raise ProblemError(
+                f"tie: {problem.name_of(dependent)} is tied in a circle, so that one tie follows "
+                "from the others: leave one of them out"
+            )
+        a, b, forces = ties.T
+        t, ones = len(ties), np.ones(len(ties))
+        rows = np.tile(np.arange(t), 2)
+        B = csr_array(coo_array((np.append(ones, -ones), (rows, np.append(a, b))), (t, n)))
+        coupling = csr_array((ones, (forces, np.arange(t))), shape=(n, t)) @ B
+        prescribed = constraints.prescribed.copy()
+        prescribed[forces] = True
+        equations = csr_array(B.multiply((~prescribed).astype(np.float64)[None]))
+        normal = None
+        if t:
+            normal = direct_solver("auto").factorise(csc_array(equations @ equations.T))
+        return cls(
+            matrix=csr_array(coupling + coupling.T),
+            equations=equations,
+            normal=normal,
+            forces=forces,
+            constraints=constraints,
+            levels=tuple(constraints.restricted(numbers) for numbers in levels),
+        )
+
+    def shift(self, r: Array) -> Array:
+        """The least x, (n,), of B x = r of the ties."""
+        if self.normal is None:
+            return np.zeros_like(r)
+        return np.asarray(self.equations.T @ self.normal.solve(r[self.forces]))
+
+    def put_forces(self, x: Array, left: Array) -> None:
+        """Put into x the forces f of B' f = left, (n,), in the sense of least squares."""
+        if self.normal is not None:
+            x[self.forces] = self.normal.solve(self.equations @ left)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +116,7 @@ class MatrixFreeOperator:
     products: tuple[ElementProduct, ...]
     loads_matrix: csr_array
     diagonals: Array
-    ties: Ties
+    ties: TieForces
     lower: csr_array
     constrained: Integers
     work: tuple[Array, Array]
@@ -58,7 +127,7 @@ class MatrixFreeOperator:
         problem: Problem,
         levels: MultigridLevels,
         iteration: KrylovSettings,
-        ties: Ties,
+        ties: TieForces,
         x: Array,
     ) -> MatrixFreeOperator:
         """At x, (n,)."""
@@ -73,7 +142,9 @@ class MatrixFreeOperator:
                 products.append(
                     ElementProduct.of(block, x, parameters, levels.numberings[block.name])
                 )
-                lower = lower + _projected(block, x, parameters, levels, ties.free, diagonal)
+                lower = lower + _projected(
+                    block, x, parameters, levels, ties.constraints.free, diagonal
+                )
             else:
                 tangents = block.tangent(x, parameters)[1]
                 loads_matrix = loads_matrix + _matrix(block.dofs, tangents, len(x))
@@ -81,11 +152,11 @@ class MatrixFreeOperator:
         order = levels.unknowns[0]
         if loads_matrix.nnz:
             loads_matrix = csr_array(loads_matrix)[order][:, order]
-            P = without(levels.steps[0], ties.free[order])
+            P = without(levels.steps[0], ties.constraints.free[order])
             lower = lower + P.T @ loads_matrix @ P
-        T = ties.follows[1].matrix
+        T = ties.levels[1].square
         numbering = next(iter(levels.numberings.values()))
-        constrained = np.flatnonzero(~ties.follows[0].moving)
+        constrained = np.flatnonzero(~ties.levels[0].moving)
         work = numbering.vector(), numbering.vector()
         return cls(
             problem=problem,
@@ -127,12 +198,12 @@ class MatrixFreeOperator:
     def apply(self, v: Array) -> Array:
         """T' K T v node by node, with ones for constrained unknowns."""
         source, target = self.work
-        x, follow = source[: len(v)], self.ties.follows[0]
+        x, constraints = source[: len(v)], self.ties.levels[0]
         x[:] = v
         x[self.constrained] = 0.0
-        follow.expand(x)
+        constraints.spread(x)
         y = self._product(source, target).copy()
-        follow.gather(y)
+        constraints.collect(y)
         y[self.constrained] = v[self.constrained]
         return y
 
@@ -157,14 +228,14 @@ class MatrixFreeOperator:
 
     def solve(self, r: Array) -> Array:
         """x of K x = r.  Raises SingularMatrix if the iteration does not converge."""
-        order, ties, follow = self.levels.unknowns[0], self.ties, self.ties.follows[0]
+        order, ties, constraints = self.levels.unknowns[0], self.ties, self.ties.levels[0]
         fixed, tied = self.problem.fixed, len(self.ties.forces) > 0
         x = ties.shift(r)
         b = (r - self._untied(x) if tied else r)[order]
-        follow.gather(b)
+        constraints.collect(b)
         b[self.constrained] = 0.0
         z = self._iterated(b)
-        follow.expand(z)
+        constraints.spread(z)
         x[order] += z
         if tied:
             ties.put_forces(x, r - self._untied(x))
@@ -193,22 +264,22 @@ class MatrixFreeOperator:
         return bool(abs(u @ Kv - v @ Ku) <= 1e-10 * size)
 
     def _multigrid(self) -> MultigridCycle:
-        levels, follows = self.levels, self.ties.follows
+        levels, level_constraints = self.levels, self.ties.levels
         diagonal = self.diagonals[levels.unknowns[0]]
         if not np.isfinite(diagonal).all():
             raise SingularMatrix("the tangent has entries that are not finite")
-        follows[0].gather(diagonal)
+        level_constraints[0].collect(diagonal)
         diagonal[self.constrained] = 1.0
         multigrid_levels, matrix = list[MultigridLevel](), self.lower
-        for step, (upper, lower) in zip(levels.steps, pairwise(follows), strict=True):
-            P = without(step, upper.moving) @ lower.matrix
+        for step, (upper, lower) in zip(levels.steps, pairwise(level_constraints), strict=True):
+            P = without(step, upper.moving) @ lower.square
             if not multigrid_levels:
                 multigrid_levels.append(MultigridLevel.of(self.apply, diagonal, P))
                 continue
             A = _with_ones(matrix, upper.moving)
             multigrid_levels.append(MultigridLevel.of(A.__matmul__, A.diagonal(), P))
             matrix = csr_array(P.T @ matrix @ P)
-        moving = follows[-1].moving
+        moving = level_constraints[-1].moving
         masked_nullspace = np.where(moving[:, None], levels.nullspace, 0.0)
         lowest = coarse_solver(_with_ones(matrix, moving), masked_nullspace, levels.components)
         return MultigridCycle(multigrid_levels, lowest)

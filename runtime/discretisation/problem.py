@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
-from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.constraints import Constraints, require_prescribed
 from softehl.runtime.discretisation.dofmap import DofLayout
 from softehl.runtime.discretisation.problem_checks import (
     ProblemError,
-    contradiction,
     in_order,
     require_known,
     unknown_name,
@@ -92,7 +92,7 @@ class Problem:
             )
         ordered = {n: in_order(self.assembler.block(n), v) for n, v in self.parameters.items()}
         object.__setattr__(self, "parameters", ordered)
-        self._require_prescribed()
+        require_prescribed(self.fixed, self.values, self.layout.total, self.name_of)
 
     def __repr__(self) -> str:
         """Summary in one line."""
@@ -102,24 +102,10 @@ class Problem:
             f"{len(self.fixed)} prescribed; blocks: {short_list(self.parameters)}>"
         )
 
-    def _require_prescribed(self) -> None:
-        fixed, n = self.fixed, self.layout.total
-        if np.shape(fixed) != np.shape(self.values) or np.ndim(fixed) != 1:
-            raise ProblemError(
-                f"fixed has shape {np.shape(fixed)} and values {np.shape(self.values)}: they are "
-                "lists of one length"
-            )
-        if len(fixed) and not 0 <= fixed.min() <= fixed.max() < n:
-            raise ProblemError(f"fixed: unknowns are numbered from 0 to {n - 1}")
-        if not np.isfinite(self.values).all():
-            first = int(fixed[~np.isfinite(self.values)][0])
-            raise ProblemError(f"{self.name_of(first)} is prescribed to a value that is not finite")
-        conflict = contradiction(fixed, self.values)
-        if conflict:
-            number, one, other = conflict
-            raise ProblemError(
-                f"{self.name_of(number)} is prescribed twice, to {one:g} and to {other:g}"
-            )
+    @cached_property
+    def constraints(self) -> Constraints:
+        """The map u = T z + g of prescribed values and ties."""
+        return Constraints.of(self.assembler, self.fixed, self.values)
 
     def name_of(self, number: int) -> str:
         """Return an unknown in words: its number, field, element and place.
@@ -184,8 +170,7 @@ class Problem:
             Residual.
         """
         r = self.assembler.residual(x, self.parameters)
-        r[self.fixed] = x[self.fixed] - self.values
-        return r
+        return self.constraints.residual(r, self.constraints.deviation(x))
 
     def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
         """Return R(x) and K = dR/dx, with prescribed unknowns eliminated.
@@ -253,11 +238,8 @@ class Problem:
         r, K = self.assembler.linearise(x, self.parameters)
         if addition is not None:
             K.data += addition
-        defect, along = np.zeros_like(r), np.zeros_like(r)
-        defect[self.fixed] = x[self.fixed] - self.values
-        if defect.any():
-            r = r - K @ defect
-        r[self.fixed] = defect[self.fixed]
+        constraints, along = self.constraints, np.zeros_like(r)
+        r = constraints.residual(r, constraints.deviation(x), lambda v: np.asarray(K @ v))
         if rate is not None and rate.any():
             along = np.asarray(K @ rate)
             along[self.fixed] = 0.0
@@ -341,13 +323,10 @@ class Problem:
             terms = self._terms(np.abs(x), K)
             if rounded:
                 noise = self.noise(x, K)
-        free: Flags = np.ones(len(r), dtype=bool)
-        free[self.fixed] = False
-        defect = np.where(free, np.maximum(np.abs(r) - noise, 0.0), 0.0)
-        target = x.copy()
-        target[self.fixed] = self.values
+        prescribed, target = self.constraints.prescribed, self.constraints.admissible(x)
+        defect = np.where(prescribed, 0.0, np.maximum(np.abs(r) - noise, 0.0))
         deviation, extent = x - target, np.maximum(np.abs(x), np.abs(target))
-        met = ~free | (self.assembler.counts(self.parameters) > 1)
+        met = prescribed | (self.assembler.counts(self.parameters) > 1)
         balance = ResidualBalance(defect, forces, terms, met, deviation, extent)
         norm = residual_norm(balance.squares(self.layout.fields), balance.worst())
         return max(norm, self._by_scales(defect))
@@ -546,9 +525,7 @@ class Problem:
         array (n,)
             A copy.
         """
-        y = x.copy()
-        y[self.fixed] = self.values
-        return y
+        return self.constraints.admissible(x)
 
     def since(self, x: Array) -> Problem:
         """Return the problem of the next step; see `ElementBlock.since`.
@@ -607,11 +584,7 @@ class Problem:
         sparse array (n, n)
             K.
         """
-        if not len(self.fixed):
-            return K
-        K.data[self.assembler.cross(self.fixed)] = 0.0
-        K.data[self.assembler.pattern.diagonal[self.fixed]] = 1.0
-        return K
+        return self.constraints.tangent(K, self.assembler)
 
 
 def _sizes(K: Any) -> Any:

@@ -55,17 +55,6 @@ def in_order(block: ElementBlock, parameters: Any) -> Array:
     return values
 
 
-def contradiction(fixed: Integers, values: Array) -> tuple[int, float, float] | None:
-    """An unknown that is prescribed twice, and to which different values."""
-    order = np.argsort(fixed, kind="stable")
-    same = fixed[order][1:] == fixed[order][:-1]
-    differ = np.flatnonzero(same & (values[order][1:] != values[order][:-1]))
-    if not len(differ):
-        return None
-    first, second = order[differ[0]], order[differ[0] + 1]
-    return int(fixed[first]), float(values[first]), float(values[second])
-
-
 def require_sound_elements(block: ElementBlock) -> None:
     """Raise ProblemError for an element that is inside out or flat, or has numbers not finite.
 

@@ -10,8 +10,8 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, count_of
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.discretisation.constraints import is_symmetric_where_free
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.reduced_tangent import is_symmetric_where_free
 from softehl.runtime.equations.contact_setup import contact_blocks
 from softehl.runtime.equations.mass_matrix import Masses, mass_matrix
 from softehl.runtime.equations.system import System

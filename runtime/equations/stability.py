@@ -9,16 +9,16 @@ from scipy.sparse import csc_array
 
 from softehl.log import warn
 from softehl.runtime.arrays import Array, Flags
-from softehl.runtime.discretisation.constraints import (
-    Constraints,
+from softehl.runtime.discretisation.loads import Tie
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.reduced_tangent import (
+    CondensedMap,
     concave,
     internal_negative,
     is_symmetric,
     is_symmetric_where_free,
     symmetric,
 )
-from softehl.runtime.discretisation.loads import Tie
-from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.eigen import Pivots
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 
@@ -40,8 +40,8 @@ def negative_directions(problem: Any, x: Array) -> int | None:
         K = problem.assembler.linearise(x, problem.parameters)[1]
     if not np.isfinite(K.data).all() or not is_symmetric_where_free(problem, K):
         return None
-    free = Constraints.of(problem, K)
-    if not free.map.shape[1]:
+    free = CondensedMap.of(problem, K)
+    if not free.T.shape[1]:
         return 0
     saddle = free.saddle(K)
     try:

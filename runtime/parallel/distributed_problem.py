@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.discretisation.constraints import Constraints, tie_dofs, tied_groups
 from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.discretisation.problem_checks import (
@@ -159,12 +161,12 @@ class DistributedProblem:
     def residual(self, x: Array) -> Array:
         """See the class."""
         r = self.team.exchange.added(self.problem.assembler.residual(x, self.parameters))
-        return self._prescribed(r, x - self._with_prescribed(x))
+        return self._prescribed(r, self.problem.constraints.deviation(x))
 
     def linearise(self, x: Array) -> tuple[Array, DistributedFactors]:
         """Residual with the influence of prescribed unknowns moved into it, and the tangent."""
         tangent = self.team.tangent_of(self.problem)
-        defect = x - self._with_prescribed(x)
+        defect = self.problem.constraints.deviation(x)
         r = tangent.fill(
             self.problem.assembler,
             x,
@@ -197,12 +199,10 @@ class DistributedProblem:
             terms = self._terms(np.abs(x)[owned], K)
             if rounded:
                 noise = ROUNDING * self._terms(np.abs(x)[owned] + self._reach(), K)
-        target = self._with_prescribed(x)
-        free = np.ones(len(x), dtype=bool)
-        free[problem.fixed] = False
-        defect = np.maximum(np.abs(r) - noise, 0.0) * free[owned]
+        target, prescribed = problem.constraints.admissible(x), self._owned.prescribed
+        defect = np.maximum(np.abs(r) - noise, 0.0) * ~prescribed
         deviation, extent = (x - target)[owned], np.maximum(np.abs(x), np.abs(target))[owned]
-        met = ~free[owned] | (self._counts() > 1)
+        met = prescribed | (self._counts() > 1)
         balance = ResidualBalance(defect, forces, terms, met, deviation, extent)
         return residual_norm(
             global_sum(balance.squares(self._fields())), global_max(balance.worst())
@@ -232,17 +232,13 @@ class DistributedProblem:
                 message = element_name(global_block, int(part.elements[block.name][rows[0]]))
         return _first(message)
 
-    def _with_prescribed(self, x: Array) -> Array:
-        """x with the prescribed values."""
-        target = x.copy()
-        target[self.problem.fixed] = self.problem.values
-        return target
+    @cached_property
+    def _owned(self) -> Constraints:
+        """Constraints of own unknowns."""
+        return self.problem.constraints.restricted(self.team.part.owned)
 
-    def _prescribed(self, r: Array, defect: Array) -> Array:
-        owned = self.team.part.owned
-        fixed = np.isin(owned, self.problem.fixed)
-        r[fixed] = defect[owned][fixed]
-        return r
+    def _prescribed(self, r: Array, deviation: Array) -> Array:
+        return self._owned.residual(r, deviation[self.team.part.owned])
 
     def _reach(self) -> Array:
         team = self.team
@@ -261,7 +257,7 @@ class DistributedProblem:
         """See `Problem`; magnitudes and sums of own unknowns, (k,)."""
         exchange, problem = self.team.exchange, self.problem
         root = np.sqrt(K.tangent.diagonal())
-        root[np.isin(self.team.part.owned, problem.fixed)] = 0.0
+        root[self._owned.prescribed] = 0.0
         local = exchange.copied(root * magnitudes)
         around = exchange.added(problem.assembler.around(local, self.parameters))
         return K.tangent.times_magnitudes(magnitudes) + root * around
@@ -281,6 +277,44 @@ class DistributedProblem:
         """For each field the places of its unknowns among own ones."""
         owned = self.team.part.owned
         return [np.flatnonzero(np.isin(owned, numbers)) for numbers in self.problem.layout.fields]
+
+
+def distributed_constraints(
+    problem: Problem, part: LocalSystem, exchange: HaloExchange
+) -> Constraints:
+    """Constraints of the part of a process, with z of all processes.
+
+    An unknown of a group moves only where all of the group do, on any process.
+    """
+    constraints = problem.constraints
+    first = _exchange_of_groups(part, exchange)
+    mask = first.highest((~constraints.free).astype(np.float64)) == 0.0
+    numbers, starts = first.renumbered(mask)
+    free = numbers >= 0
+    owned = np.searchsorted(np.flatnonzero(free), first.owned[mask])
+    return replace(constraints, free=free, exchange=HaloExchange.of(numbers[free], owned, starts))
+
+
+def _exchange_of_groups(part: LocalSystem, exchange: HaloExchange) -> HaloExchange:
+    """The exchange of a part in which each unknown is the first of those that it is tied to."""
+    global_system = part.system.everywhere
+    ties = tie_dofs(global_system.assembler)
+    if not len(ties):
+        return exchange
+    first = tied_groups(ties[:, 0], ties[:, 1], global_system.size)
+    numbers = _all_numbers(global_system.size, part, exchange)
+    is_master = first[part.unknowns[part.owned]] == part.unknowns[part.owned]
+    starts = np.concatenate([[0], np.cumsum(world().allgather(len(part.owned)))])
+    return HaloExchange.of(numbers[first[part.unknowns]], part.owned[is_master], starts)
+
+
+def _all_numbers(size: int, part: LocalSystem, exchange: HaloExchange) -> Integers:
+    """PETSc's number of each unknown of the global system."""
+    result = np.zeros(size, dtype=np.int64)
+    owned = part.unknowns[part.owned], exchange.numbers[part.owned]
+    for unknowns, numbers in world().allgather(owned):
+        result[unknowns] = numbers
+    return result
 
 
 def _first(message: str) -> str:

@@ -11,8 +11,8 @@ from scipy.sparse import csc_array
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.communicator import Communicator
-from softehl.runtime.discretisation.constraints import symmetric
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.reduced_tangent import symmetric
 from softehl.runtime.equations.system import System
 from softehl.runtime.parallel.linear_solver_choice import Linear, linear_solver, modes_by_multigrid
 from softehl.runtime.solve.linear.amg import NearNullspace

@@ -11,15 +11,16 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.communicator import Communicator
-from softehl.runtime.discretisation.constraints import Ties
 from softehl.runtime.discretisation.element_blocks import ElementBlock
-from softehl.runtime.discretisation.matrix_free_operator import KrylovSettings, MatrixFreeOperator
+from softehl.runtime.discretisation.matrix_free_operator import (
+    KrylovSettings,
+    MatrixFreeOperator,
+    TieForces,
+)
 from softehl.runtime.discretisation.matrix_free_products import (
     NoProductError,
     require_product,
@@ -124,10 +125,10 @@ def levels_of(
     return MultigridLevels.of(points, dofmap, pages, order=order, size=system.size, threads=threads)
 
 
-def ties_of(problem: Problem, levels: MultigridLevels) -> Ties:
+def ties_of(problem: Problem, levels: MultigridLevels) -> TieForces:
     """Ties of a problem on all levels.  Raises StudyError where one follows from others."""
     try:
-        return Ties.of(problem, levels.unknowns)
+        return TieForces.of(problem, levels.unknowns)
     except ProblemError as error:
         raise StudyError(str(error)) from None
 
@@ -183,7 +184,7 @@ class MatrixFreeProblem:
         return self
 
     @cached_property
-    def ties(self) -> Ties:
+    def ties(self) -> TieForces:
         """Ties of all its steps.  Raises StudyError where one follows from others."""
         return ties_of(self.problem, self.levels)
 
@@ -196,12 +197,8 @@ class MatrixFreeProblem:
         problem = self.problem
         r = problem.assembler.residual(x, problem.parameters)
         tangent = MatrixFreeOperator.of(problem, self.levels, self.iteration, self.ties, x)
-        defect = np.zeros_like(r)
-        defect[problem.fixed] = x[problem.fixed] - problem.values
-        if defect.any():
-            r = r - tangent.times(defect)
-        r[problem.fixed] = defect[problem.fixed]
-        return r, tangent
+        constraints = problem.constraints
+        return constraints.residual(r, constraints.deviation(x), tangent.times), tangent
 
     def norm(self, r: Array) -> float:
         """Never asked: the problem measures its residuals itself."""

@@ -17,7 +17,6 @@ from scipy.sparse import coo_array
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.discretisation import matrix_free_operator as alone
 from softehl.runtime.discretisation.assembly import Assembler
-from softehl.runtime.discretisation.constraints import Ties
 from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.mpi import petsc, world
@@ -40,14 +39,14 @@ class MatrixFreeShell:
     levels: MultigridLevels
     exchange: HaloExchange
     constrained: Flags = field(init=False)
-    ties: Ties = field(init=False)
+    ties: alone.TieForces = field(init=False)
     local: alone.MatrixFreeOperator = field(init=False)
     matrix: Any = field(init=False)
     own_diagonal: Array = field(init=False)
 
     def __post_init__(self) -> None:
         """An empty shell."""
-        self.constrained = np.isin(self.exchange.owned, self.problem.fixed)
+        self.constrained = self.problem.constraints.prescribed[self.exchange.owned]
         self.ties = ties_of(self.problem, self.levels)
         sizes = self.exchange.vector.getSizes()
         self.matrix = petsc().Mat().createPython((sizes, sizes), self, comm=world())
@@ -148,13 +147,13 @@ class MatrixFreeShell:
 
     def _lower(self, nullspace: Any) -> tuple[Any, Any]:
         """The matrix at the lower order, and the interpolation from there."""
-        exchange, levels, free = self.exchange, self.levels, self.local.ties.free
+        exchange, levels, free = self.exchange, self.levels, self.local.ties.constraints.free
         numbers, local = self._numbers()
         rows, sizes = levels.unknowns[0], (len(local), int(world().allreduce(len(local))))
         owned = np.zeros(len(exchange.numbers), dtype=bool)
         owned[exchange.owned] = True
         mask = owned[rows] & free[rows]
-        step = coo_array(alone.without(levels.steps[0], mask) @ self.local.ties.follows[1].matrix)
+        step = coo_array(alone.without(levels.steps[0], mask) @ self.local.ties.levels[1].square)
         indices = exchange.numbers[rows[step.row]], numbers[step.col]
         P = _matrix(indices, step.data, (exchange.vector.getSizes(), sizes), 1)
         lower = coo_array(self.local.lower)

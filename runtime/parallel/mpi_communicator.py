@@ -11,14 +11,19 @@ from scipy.sparse import csc_array
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.communicator import Communicator
-from softehl.runtime.discretisation.constraints import concave, internal_negative
+from softehl.runtime.discretisation.constraints import Constraints
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.reduced_tangent import concave, internal_negative
 from softehl.runtime.equations.system import System
 from softehl.runtime.mpi import world
-from softehl.runtime.parallel.distributed_problem import DistributedProblem, ParallelContext
+from softehl.runtime.parallel.distributed_problem import (
+    DistributedProblem,
+    ParallelContext,
+    distributed_constraints,
+)
 from softehl.runtime.parallel.halo_exchange import global_max, global_sum
 from softehl.runtime.parallel.matrix_free import NO_INERTIA
-from softehl.runtime.parallel.slepc import DistributedConstraints, Pencil
+from softehl.runtime.parallel.slepc import Pencil
 
 T = TypeVar("T")
 
@@ -88,9 +93,9 @@ class MpiCommunicator(Communicator):
         """See `Communicator`."""
         return global_sum(values)
 
-    def constraint_map(self, problem: Problem) -> DistributedConstraints:
+    def constraints(self, problem: Problem) -> Constraints:
         """See `Communicator`."""
-        return DistributedConstraints.of(problem, self.team.part, self.team.exchange)
+        return distributed_constraints(problem, self.team.part, self.team.exchange)
 
     def local_problem(self, distributed: DistributedProblem) -> Problem:
         """See `Communicator`."""
@@ -100,17 +105,17 @@ class MpiCommunicator(Communicator):
         self, problem: Problem, K: csc_array, M: csc_array, count: int
     ) -> tuple[Array, Array]:
         """See `Communicator`."""
-        free = self.constraint_map(problem)
+        constraints = self.constraints(problem)
         rising = concave(problem, K, self.sum_shared, lambda flag: bool(global_max(float(flag))))
-        natural = int((free.gather(rising.astype(np.float64)) > 0.0).sum())
+        natural = int((constraints.gather(rising.astype(np.float64)) > 0.0).sum())
         negative = global_sum(np.array([natural + internal_negative(problem, K)]))
-        return Pencil(free, K, M).lowest(count, int(negative[0]))
+        return Pencil(constraints, K, M).lowest(count, int(negative[0]))
 
     def buckling(
         self, problem: Problem, K: csc_array, G: csc_array, count: int
     ) -> tuple[Array, Array]:
         """See `Communicator`."""
-        return Pencil(self.constraint_map(problem), K, G).factors(count)
+        return Pencil(self.constraints(problem), K, G).factors(count)
 
     def with_other_elements(self) -> Communicator:
         """See `Communicator`.  Raises StudyError without matrices."""

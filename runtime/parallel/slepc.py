@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
-from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.discretisation.constraints import symmetric, tied_groups
-from softehl.runtime.discretisation.loads import Tie
-from softehl.runtime.discretisation.problem import Problem
-from softehl.runtime.equations.system import System
+from softehl.runtime.arrays import Array
+from softehl.runtime.discretisation.constraints import Constraints
+from softehl.runtime.discretisation.reduced_tangent import symmetric
 from softehl.runtime.mpi import petsc, slepc, world
 from softehl.runtime.parallel.halo_exchange import HaloExchange, global_max, global_sum
-from softehl.runtime.parallel.partitioning import LocalSystem
 from softehl.runtime.solve.eigen import (
     NoModes,
     below,
@@ -26,79 +23,6 @@ from softehl.runtime.solve.eigen import (
 )
 from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 
-
-@dataclass(frozen=True, eq=False)
-class DistributedConstraints:
-    """As `discretisation.constraints.Constraints`, of the vectors of one process.
-
-    free: local numbers of unknowns that move. exchange: of these, where tied ones have the number
-    of the first of them.
-    """
-
-    size: int
-    free: Integers
-    exchange: HaloExchange
-
-    @classmethod
-    def of(
-        cls, problem: Problem, part: LocalSystem, exchange: HaloExchange
-    ) -> DistributedConstraints:
-        """Of the local part of a problem."""
-        constrained = np.zeros(problem.assembler.size)
-        constrained[problem.fixed] = 1.0
-        for block in problem.assembler.blocks:
-            if isinstance(block.kernel, Tie):
-                constrained[block.dofs[:, 2]] = 1.0
-        first = _tied(part, exchange)
-        mask = first.highest(constrained) == 0.0
-        numbers, starts = first.renumbered(mask)
-        free = np.flatnonzero(numbers >= 0)
-        owned = np.searchsorted(free, first.owned[mask])
-        return cls(len(constrained), free, HaloExchange.of(numbers[free], owned, starts))
-
-    def gather(self, forces: Array) -> Array:
-        """T' f: own sums over all processes of forces (m,) that the elements of each have."""
-        return self.exchange.added(forces[self.free])
-
-    def expand(self, z: Array) -> Array:
-        """T z: unknowns (m,) of own free ones."""
-        x = np.zeros(self.size)
-        x[self.free] = self.exchange.copied(z)
-        return x
-
-
-def _tied(part: LocalSystem, exchange: HaloExchange) -> HaloExchange:
-    """The exchange of a part in which each unknown is the first of those that it is tied to."""
-    global_system = part.system.everywhere
-    pairs = [b.dofs[:, :2] for b in global_system.assembler.blocks if isinstance(b.kernel, Tie)]
-    if not pairs:
-        return exchange
-    first = _first(np.concatenate(pairs), global_system.size)
-    numbers = _all_numbers(global_system, part, exchange)
-    is_master = first[part.unknowns[part.owned]] == part.unknowns[part.owned]
-    comm = world()
-    counts = comm.allgather(len(part.owned))
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    return HaloExchange.of(numbers[first[part.unknowns]], part.owned[is_master], starts)
-
-
-def _first(pairs: Integers, n: int) -> Integers:
-    """For each of n unknowns the first of those that are tied to it."""
-    groups = tied_groups(pairs[:, 0], pairs[:, 1], n)
-    _, first, inverse = np.unique(groups, return_index=True, return_inverse=True)
-    return np.asarray(first[inverse], dtype=np.int64)
-
-
-def _all_numbers(whole: System, part: LocalSystem, exchange: HaloExchange) -> Integers:
-    """PETSc's number of each unknown of the whole."""
-    result = np.zeros(whole.size, dtype=np.int64)
-    for unknowns, numbers in world().allgather(
-        (part.unknowns[part.owned], exchange.numbers[part.owned])
-    ):
-        result[unknowns] = numbers
-    return result
-
-
 _EXACT = 1e-11  # of eigenvalues
 _PREFIX = "softehl_eigen_"
 
@@ -107,25 +31,26 @@ _PREFIX = "softehl_eigen_"
 class Pencil:
     """Matrix pencil of the free unknowns, each matrix the sum of those of the processes (m, m)."""
 
-    free: DistributedConstraints
+    constraints: Constraints
     K: csc_array
     M: csc_array
 
     @property
     def exchange(self) -> HaloExchange:
         """Of free unknowns."""
-        return self.free.exchange
+        assert isinstance(self.constraints.exchange, HaloExchange)
+        return self.constraints.exchange
 
     def lowest(self, count: int, saddle: int) -> tuple[Array, Array]:
         """See `solve.eigen.lowest`; vectors (count, m) of the unknowns of this process."""
-        K, M = (self.free.gather(A.diagonal()) for A in (self.K, self.M))
+        K, M = (self.constraints.gather(A.diagonal()) for A in (self.K, self.M))
         require_count(count, int(global_sum(np.array([float((M > 0.0).sum())]))[0]))
         ratio = global_max(float(np.abs(K[M > 0.0] / M[M > 0.0]).max(initial=0.0)))
         eps, factors = self._shifted(count)
         below(lambda shift: factors.at(eps, shift), self._nearly_singular, ratio, saddle)
         values, vectors = _eigenpairs(eps, count, "modes")
         mass, order = eps.getOperators()[1], np.argsort(values.real)[:count]
-        modes = np.empty((len(order), self.free.size))
+        modes = np.empty((len(order), len(self.constraints.free)))
         for mode, k in zip(modes, order, strict=True):
             # once more by the inverse: unknowns without mass follow from the others
             right, shape = vectors[k].duplicate(), vectors[k].duplicate()
@@ -170,8 +95,8 @@ class Pencil:
     def _matrix(self, A: csc_array) -> Any:
         """T' A T as a matrix of PETSc's."""
         PETSc, entries = petsc(), coo_array(symmetric(A))
-        numbers = np.full(self.free.size, -1, dtype=PETSc.IntType)
-        numbers[self.free.free] = self.exchange.numbers
+        numbers = np.full(len(self.constraints.free), -1, dtype=PETSc.IntType)
+        numbers[self.constraints.free] = self.exchange.numbers
         matrix, sizes = PETSc.Mat().create(comm=world()), self.exchange.vector.getSizes()
         matrix.setSizes((sizes, sizes), 1)
         matrix.setType("aij")
@@ -180,13 +105,13 @@ class Pencil:
         return matrix
 
     def _local(self, vector: Any) -> Array:
-        return self.free.expand(np.array(vector.array_r[self.exchange.positions]))
+        return self.constraints.expand(np.array(vector.array_r[self.exchange.positions]))
 
     def _nearly_singular(self, factors: _ShiftedFactors) -> bool:
         """See `solve.eigen.nearly_singular`."""
         b = np.random.default_rng(world().rank).uniform(-1.0, 1.0, len(self.exchange.owned))
-        x = self.free.expand(factors.solve(b))
-        size = self.free.gather(abs(self.K) @ np.abs(x))
+        x = self.constraints.expand(factors.solve(b))
+        size = self.constraints.gather(abs(self.K) @ np.abs(x))
         largest_entries = [global_max(float(np.abs(v).max(initial=0.0))) for v in (b, size)]
         return bool(largest_entries[0] <= 1e-11 * largest_entries[1])
 
