@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from softehl.codegen import external_function
 from softehl.codegen.abi import DESIGN, ROLLED, Target, Task, derivative_task
 from softehl.codegen.derive import point_outputs, potential_structure, task_outputs
 from softehl.codegen.derive.output_entries import Entry, replace_values
@@ -45,7 +46,7 @@ from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_kernel import Choice, choose
 from softehl.codegen.emit.points.point_layout import Layout, Needs
 from softehl.codegen.graph.graph import Routine
-from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.definition import Definition, functions_of_user
 from softehl.codegen.optimise import passes
 
 SHORT = 3000
@@ -107,6 +108,18 @@ class KernelSource:
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
     """Compile all kernels of one model; `codegen.abi` describes the targets."""
+    made = _compiled(definition, target)
+    sources = {
+        f"{f.symbol}.c": f.source() for f in functions_of_user(definition).values() if f.text
+    }
+    if target is Target.UFCX:  # a file holds all that it calls
+        return replace(
+            made, text=external_function.static("\n".join([*sources.values(), made.text]))
+        )
+    return replace(made, shared={**made.shared, **sources})
+
+
+def _compiled(definition: Definition, target: Target) -> KernelSource:
     tasks = task_outputs.tasks(definition)
     if target is Target.UFCX:
         tasks = ufcx.tasks(definition, tasks)

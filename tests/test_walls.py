@@ -22,7 +22,17 @@ ALLOWED = {
 }
 ORDER = {
     "codegen": (
-        *("abi", "graph", "elements", "language", "derive", "optimise", "emit"),
+        *(
+            "abi",
+            "c_compiler",
+            "external_function",
+            "graph",
+            "elements",
+            "language",
+            "derive",
+            "optimise",
+            "emit",
+        ),
         *("verify", "pipeline", "hosts", "models", "tools"),
     ),
     "runtime": (

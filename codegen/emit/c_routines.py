@@ -15,9 +15,16 @@ from collections.abc import Callable, Iterable, Sequence
 
 from softehl.codegen.emit.c_printer import Printer, number
 from softehl.codegen.emit.code_motion import schedule
+from softehl.codegen.external_function import LOWEST_ADDRESS
 from softehl.codegen.graph.divided_difference import Quotient
 from softehl.codegen.graph.graph import Graph, Node, Op, Routine
-from softehl.codegen.graph.routines import Inverse, Isotropic, Newton, derivatives_of_energy
+from softehl.codegen.graph.routines import (
+    External,
+    Inverse,
+    Isotropic,
+    Newton,
+    derivatives_of_energy,
+)
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
@@ -157,6 +164,8 @@ def _text(d: Definition, r: Routine) -> list[str]:
             return [_JACOBI, *_isotropic(d, r)]
         case Quotient():
             return quotient(r.op, _signature(d, r))
+        case External():
+            return _external(d, r)
     raise TypeError(f"no C for {r}")
 
 
@@ -244,6 +253,33 @@ def _inverse(d: Definition, r: Inverse) -> str:
     return 1;
 }}
 """
+
+
+def _external(d: Definition, r: External) -> list[str]:
+    f = r.function
+    texts, name = [f.declaration], f.symbol
+    if not f.text:
+        name = f"softehl_{d.name}_at_{f.name}"
+        texts = [
+            f"""#include <stdint.h>
+static int {name}(int order, const double *restrict p, double *restrict s)
+{{
+    typedef int function(const double *, double *, double *, double *);
+    if (!(p[0] >= {LOWEST_ADDRESS}.0)) return 1;
+    function *at = (function *)(uintptr_t)p[0];
+    const double *x = p + 1;
+{f.body("at").removeprefix("{").lstrip(chr(10))}"""
+        ]
+    return [
+        *texts,
+        f"""/* {r.name}: {f.name} of the user, derivatives up to order {r.order} */
+{_signature(d, r)}{{
+    if (!{name}({r.order}, p, s)) return 0;
+    for (int k = 0; k < {r.outputs}; ++k) s[k] = NAN;
+    return 1;
+}}
+""",
+    ]
 
 
 def _isotropic(d: Definition, r: Isotropic) -> list[str]:

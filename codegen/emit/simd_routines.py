@@ -12,7 +12,7 @@ from softehl.codegen.emit import c_routines
 from softehl.codegen.emit.c_printer import number
 from softehl.codegen.emit.simd_printer import LanePrinter
 from softehl.codegen.graph.graph import Routine
-from softehl.codegen.graph.routines import Inverse, Isotropic, Newton
+from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton
 from softehl.codegen.language.definition import Definition
 
 
@@ -27,7 +27,7 @@ def _text(d: Definition, r: Routine) -> list[str]:
             return _newton(d, r)
         case Inverse():
             return [_inverse(d, r)]
-        case Isotropic():
+        case Isotropic() | External():
             return [*c_routines.texts(d, [r]), _one_by_one(d, r)]
     raise TypeError(f"no C for {r}")
 

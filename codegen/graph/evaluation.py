@@ -17,7 +17,7 @@ from mpmath.libmp import NoConvergence
 
 from softehl.codegen.graph.graph import Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.precise_arithmetic import arctangent, number
-from softehl.codegen.graph.routines import Inverse, Isotropic, Newton, depends
+from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton, depends
 from softehl.codegen.graph.traversal import Recursion, reachable, recursion
 
 Number = Any
@@ -38,6 +38,10 @@ def results(r: Routine, args: Vector, evaluate: Evaluate) -> Vector:
             return [inverted[i, j] for i in range(r.size) for j in range(r.size)]
         case Isotropic():
             return _isotropic(r, args, evaluate)
+        case External():
+            x = args[r.inputs - r.function.inputs :]
+            values = r.function.near(x, mpmath.mpf, r.order)
+            return [mpmath.nan] * r.outputs if values is None else values
     raise TypeError(f"no value for {r}")
 
 

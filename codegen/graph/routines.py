@@ -1,5 +1,7 @@
 """Routines that a graph can call: local Newton iteration, inverse matrix, function of stretches.
 
+A C function of a user is called in the same way (`External`).
+
 Each is opaque to the passes and printed as a C function of its own (`emit.c_routines`).  Its
 derivatives are results of routines and ordinary nodes, so that they can be differentiated again.
 """
@@ -10,6 +12,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from softehl.codegen.external_function import HIGHEST, ExternalFunction
+from softehl.codegen.external_function import upper as upper_entry
 from softehl.codegen.graph.differentiation import gradient
 from softehl.codegen.graph.divided_difference import Divided, exchange_inputs
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, ResultIndex, Routine
@@ -326,3 +330,85 @@ def derivatives_of_energy(g: Graph, r: Isotropic) -> list[Node]:
     second = [gradient(g, first[a], c)[b] for k, a in enumerate(c) for b in c[k:]]
     divided = [exchange_inputs(g, [first[c[a]]], c[a], c[b])(first[c[a]]) for a, b in PAIRS]
     return [*(first[a] for a in c), *second, *divided]
+
+
+# ------------------------------------------------------------------------- functions of the user
+
+
+@dataclass(frozen=True, eq=False)
+class External(Routine):
+    """A C function of the user, with its derivatives up to `order`.
+
+    Operands: its address where it has no text, then its arguments.  Results: values, first
+    derivatives, upper triangles of the second ones.  where: line of the page.
+    """
+
+    function: ExternalFunction
+    order: int
+    where: str = field(default="", compare=False)
+    _raised: dict[int, Routine] = field(default_factory=dict)
+
+    def partials(self, g: Graph, item: Node) -> Pairs:
+        f, call, k = self.function, item.args[0], result_index(item)
+        m, n, args = f.inputs, f.outputs, item.args[0].args[self.inputs - f.inputs :]
+        if k < n:
+            call = self._up_to(g, 1, call)
+            places = [n + k * m + j for j in range(m)]
+        elif k < n * (1 + m):
+            call = self._up_to(g, 2, call)
+            k, i = divmod(k - n, m)
+            start = n * (1 + m) + k * m * (m + 1) // 2
+            places = [start + upper_entry(m, i, j) for j in range(m)]
+        else:
+            raise DifferentiationError(self._missing(3))
+        return [
+            (a, g.node(Op.ITEM, (call,), ResultIndex(p))) for a, p in zip(args, places, strict=True)
+        ]
+
+    def _up_to(self, g: Graph, order: int, call: Node) -> Node:
+        """The same call with derivatives of an order."""
+        if order <= self.order:
+            return call
+        if order > self.function.orders:
+            raise DifferentiationError(self._missing(order))
+        if order not in self._raised:
+            self._raised[order] = external(
+                f"{self.name}_{order}", self.function, order=order, where=self.where
+            )
+        return g.node(Op.CALL, call.args, self._raised[order])
+
+    def _missing(self, order: int) -> str:
+        f = self.function
+        if order > HIGHEST:
+            remedy = "third derivatives have no place in the prototype: give the first ones as y"
+        elif f.derivatives == 0:
+            remedy = (
+                "write it for numbers of type `double complex`, then derivatives follow by complex "
+                f"steps, or return them and say derivatives={order}"
+            )
+        else:
+            remedy = f"return them as {'d' * order}y and say derivatives={order}"
+        place = f"{self.where}: " if self.where else ""
+        return (
+            f"{place}{f.name} has derivatives of order {f.orders}, and the kernel needs those of "
+            f"order {order}: {remedy}"
+        )
+
+
+def external(name: str, f: ExternalFunction, *, order: int = 0, where: str = "") -> External:
+    """The routine of a C function."""
+    return External(name, f.inputs + (not f.text), f.results(order), f, order, where)
+
+
+def external_functions(roots: Iterable[Node]) -> dict[Node, ExternalFunction]:
+    """Calls of C functions below some values, also those inside local equations."""
+    found: dict[Node, ExternalFunction] = {}
+    waiting, seen = [list(roots)], set[Routine]()
+    while waiting:
+        for n in reachable(waiting.pop()):
+            if isinstance(n.payload, External):
+                found[n] = n.payload.function
+            elif isinstance(n.payload, Newton) and n.payload not in seen:
+                seen.add(n.payload)
+                waiting.append(list(n.payload.equations))
+    return found

@@ -10,11 +10,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files as resources
 
-from softehl.codegen import abi, pipeline
+from softehl.codegen import abi, external_function, pipeline
 from softehl.codegen.abi import Task
 from softehl.codegen.emit import c_source
 from softehl.codegen.emit.c_printer import number
 from softehl.codegen.hosts.element_interface import ElementInterface
+from softehl.codegen.language.definition import functions_of_user
 from softehl.codegen.pipeline import KernelSource
 
 ARRAYS = "ptrdiff_t n, const double *X, const double *u, const double *data,\n    const double *p"
@@ -29,12 +30,14 @@ def files(
     """
     kernel = pipeline.compile_model(interface.definition)
     lanes = [c_source.ONE_LANE] if single else []
+    external = {f"{f.symbol}.c" for f in functions_of_user(interface.definition).values()}
+    before = [text for file, text in kernel.shared.items() if file not in external]
+    after = [text for file, text in kernel.shared.items() if file in external]
+    parts = [*lanes, *map(_private, before), kernel.text, functions(interface), *after]
     names = [abi.function_name(interface.name, t) for t in kernel.functions]
     return {
         f"{interface.name}.h": header(interface),
-        f"{interface.name}.c": "\n".join(
-            [*lanes, *map(_private, kernel.shared.values()), kernel.text, functions(interface)]
-        ),
+        f"{interface.name}.c": external_function.static("\n".join(parts)),
         c_source.HEADER: c_source.header(names, signed=False),
     }, kernel
 

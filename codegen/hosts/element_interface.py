@@ -63,6 +63,11 @@ class ElementInterface:
                 f"{d.name} interpolates {d.interpolated} with any number of unknowns: target "
                 f"{host} needs a fixed number, use simd or scalar"
             )
+        if d.functions:
+            raise TargetError(
+                f"{d.name} gets the address of {d.functions[0]} when it is called: target {host} "
+                "has no addresses, name its C text, m.external(..., source=...)"
+            )
         return ElementInterface(replace(d, pseudo_load=False, fields_rate=False))
 
     def require(self, host: str, *tasks: str) -> None:

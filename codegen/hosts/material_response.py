@@ -23,7 +23,7 @@ from softehl.codegen.graph.traversal import substitute
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.registry import Files, StatesOf
 from softehl.codegen.language import kinematics
-from softehl.codegen.language.definition import Argument, Definition
+from softehl.codegen.language.definition import Argument, Definition, functions_of_user
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.language.model import PARENT_NAMES, Model
 
@@ -186,6 +186,11 @@ def _small(law: Law, m: Model) -> Response:
     return Response(law, Measure.SMALL, _at_rest(d), d, material.W is not None)
 
 
+def _rounding(d: Definition) -> Any:
+    """What symmetric values may differ by, relative to their size."""
+    return mpmath.mpf(10) ** (-12 if functions_of_user(d) else -20)
+
+
 def checked(r: Response, states: Sequence[State]) -> Response:
     """The response without its test: raises `TargetError` where its stress is not symmetric."""
     d = r.definition
@@ -195,7 +200,7 @@ def checked(r: Response, states: Sequence[State]) -> Response:
         for state in states:
             walk = Walk(state, {})
             size = max(abs(walk.at(n, 0)) for n in stress)
-            if any(abs(walk.at(n, 0)) > size * mpmath.mpf(10) ** -20 for n in skew):
+            if any(abs(walk.at(n, 0)) > size * _rounding(d) for n in skew):
                 raise TargetError(
                     f"the stress of {r.law.name} is not symmetric: its energy must not change "
                     "when the body rotates, write it by F.T * F"
@@ -212,7 +217,7 @@ def packed(r: Response, states: Sequence[State]) -> Response:
             walk = Walk(state, {})
             C = [[walk.at(d.fields[r.modulus(i, j)][1], 0) for j in range(6)] for i in range(6)]
             size = max(abs(c) for row in C for c in row)
-            if any(abs(C[i][j] - C[j][i]) > size * mpmath.mpf(10) ** -20 for i, j in _BELOW):
+            if any(abs(C[i][j] - C[j][i]) > size * _rounding(d) for i, j in _BELOW):
                 raise TargetError(
                     f"the modulus of {r.law.name} is not symmetric at a random state: target "
                     "calculix stores 21 moduli; give an energy, m.energy(W), or a state that the "

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from softehl.codegen.elements.quadrature import QuadratureRule
+from softehl.codegen.external_function import ExternalFunction
 from softehl.codegen.graph.graph import Graph, Node
+from softehl.codegen.graph.routines import external_functions
 from softehl.codegen.language.sympy_tape import SympyTape
 
 
@@ -143,6 +145,8 @@ class Definition:
         Point data with new values after a step.
     internal : tuple of str
         Unknowns of one element alone.
+    functions : tuple of str
+        Parameters that are addresses of C functions.
     point_rates : bool
         Whether point data have rates.
     cell : str
@@ -190,6 +194,8 @@ class Definition:
     """Point data that the last fields are the new values of."""
     internal: tuple[str, ...] = ()
     """Unknowns of one element alone, which a study condenses."""
+    functions: tuple[str, ...] = ()
+    """Parameters that are addresses of C functions."""
     point_rates: bool = False
     """Whether the second half of the point data says how the first moves along a variation."""
     cell: str = ""
@@ -240,3 +246,9 @@ class Definition:
             point=self.point
             and replace(self.point, definition=self.point.definition.for_derivatives()),
         )
+
+
+def functions_of_user(d: Definition) -> dict[Node, ExternalFunction]:
+    """Calls of C functions of the user in a model."""
+    given = [n for pairs in d.prescribed.values() for n in pairs.values()]
+    return external_functions([d.potential, *(n for _, n in d.fields), *given])

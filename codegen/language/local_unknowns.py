@@ -14,6 +14,7 @@ from softehl.codegen.graph.graph import Graph, Input, Node, Op
 from softehl.codegen.graph.routines import (
     SYMMETRIC,
     Control,
+    External,
     Isotropic,
     depends,
     isotropic,
@@ -127,6 +128,11 @@ def principal(
     value = symbols.lower(written)
     if any(isinstance(n.payload, Isotropic) for n in depends([value], local)):
         raise ModelError(f"{name}: its energy holds an energy of other stretches; add them outside")
+    if any(isinstance(n.payload, External) for n in depends([value], local)):
+        raise ModelError(
+            f"{name}: its energy calls a C function of the stretches, which has no divided "
+            "differences: call it with invariants of C"
+        )
     if not symmetric(value, local):
         raise ModelError(f"{name}: the energy changes when two stretches are exchanged")
     system = localise(symbols.graph, [value], local)

@@ -162,6 +162,26 @@ class Material:
         """
         return self.model.principal(f"{self.name}_{name}", C, energy)
 
+    def external(self, name: str, inputs: Any, **prototype: Any) -> Any:
+        """Return the values of a C function of the user, as `Model.external`.
+
+        Parameters
+        ----------
+        name : str
+            Name of the values, and of the function in C.
+        inputs : Expr, list or Matrix
+            Arguments of the function.
+        **prototype
+            `outputs`, `source`, `derivatives` and `function` of `Model.external`.
+
+        Returns
+        -------
+        Symbol, list or Matrix
+            The values.
+        """
+        prototype.setdefault("function", name)
+        return self.model.external(f"{self.name}_{name}", inputs, **prototype)
+
     def energy(self, W: Any) -> None:
         """Define the energy; further energies add up.
 

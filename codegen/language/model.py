@@ -14,7 +14,7 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language import local_unknowns
+from softehl.codegen.language import external_functions, local_unknowns
 from softehl.codegen.language.definition import Argument, Definition
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.flatten import CheckedList
@@ -426,6 +426,57 @@ class Model(ModelBuilder):
             C has a wrong shape, or the energy is not symmetric.
         """
         return local_unknowns.principal(self._symbols, name, C, energy)
+
+    def external(
+        self,
+        name: str,
+        inputs: Any,
+        *,
+        outputs: Any = 1,
+        source: Any = None,
+        derivatives: int | None = None,
+        function: str | None = None,
+    ) -> Any:
+        """Return the values of a C function of the user.
+
+        Parameters
+        ----------
+        name : str
+            Name of the values, and of the function in C.
+        inputs : Expr, list or Matrix
+            Arguments x of the function, row by row where they are matrices.
+        outputs : int or tuple of int
+            Number of values y; 1 gives a scalar, (3, 3) a matrix.
+        source : str or Path, optional
+            C file beside the page, or its text. Left out: the address of the function is given to
+            `Study.add(name=...)`, as of ctypes, cffi or Numba.
+        derivatives : int, optional
+            Highest order of derivatives that the function returns, 0, 1 or 2; 1 if left out, 0 for
+            a function of `double complex`.
+        function : str, optional
+            Name in C, if it is another one than `name`.
+
+        Returns
+        -------
+        Symbol, list or Matrix
+            The values.
+
+        Raises
+        ------
+        ModelError
+            The file, the function or a count is missing or wrong.
+
+        Notes
+        -----
+        The prototype is `int law(const double *x, double *y, double *dy, double *ddy)`, with dy
+        [outputs][inputs] and ddy [outputs][inputs][inputs] where they are not NULL. It returns 0,
+        or another number where there is no value. With `double complex` instead of `double` the
+        derivatives of the next order follow by complex steps. Threads call it at the same time.
+        """
+        what = function or name
+        address = [] if source is not None else [self._address(what)]
+        prototype = external_functions.Prototype(what, outputs, derivatives, source)
+        return external_functions.external_values(self._symbols, name, inputs, prototype, address)
 
     def derivative(self, name: str, value: Any, by: Any) -> Any:
         """Return derivatives of a scalar, such as P = dW/dF.

@@ -524,6 +524,7 @@ class ModelBuilder:
         self._intermediates = Intermediates(self._symbols)
         self._equations = Equations(self._symbols)
         self._outputs = Outputs(self._symbols)
+        self._functions: dict[str, Node] = {}
 
     def _foreign(self, rule: QuadratureRule, nodes: int) -> str:
         """Words on a rule of another cell than that of the nodes."""
@@ -576,6 +577,7 @@ class ModelBuilder:
             dof_nodes=tuple(a.dof_nodes),
             history=tuple(name for name, _ in o.history),
             internal=tuple(a.internal),
+            functions=tuple(self._functions),
             record=self._symbols.record,
             statements=tuple(self._symbols.statements),
         )
@@ -592,6 +594,13 @@ class ModelBuilder:
         equations = set(reachable([potential, *prescribed]))
         used = equations | set(reachable([n for _, n in self._outputs.evaluated]))
         self._arguments.check_use(equations, used, self._unused)
+
+    def _address(self, function: str) -> Node:
+        """Parameter that is the address of a C function, which calls of it share."""
+        if function not in self._functions:
+            (symbol,) = self._arguments.declare("parameters", {function: "address of a C function"})
+            self._functions[function] = self._symbols.bound[symbol]
+        return self._functions[function]
 
     def _condensed(self, name: str, values: list[Node], unknowns: list[Node]) -> list[Node]:
         """Equations of local unknowns; integrals of these, and with them the loop, written out."""

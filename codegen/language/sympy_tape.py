@@ -12,6 +12,7 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.external_function import ExternalFunction
 from softehl.codegen.language.named_symbols import placeholders
 
 
@@ -44,6 +45,15 @@ class Principal:
     energy: Any
     squares: tuple[Any, ...]
     entries: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class External:
+    """Result `index` of a C function of the user at `inputs`."""
+
+    function: ExternalFunction
+    inputs: tuple[Any, ...]
+    index: int
 
 
 @dataclass(frozen=True)
@@ -86,6 +96,13 @@ class SympyTape:
         pairs = [(C[i, j], C[j, i]) for i in range(3) for j in range(3)]
         entries = tuple(sp.sympify(a if a is b else (a + b) / 2) for a, b in pairs)
         return self.define(symbol, Principal(energy, tuple(squares), entries))
+
+    def external(
+        self, function: ExternalFunction, inputs: Sequence[Any], results: Sequence[Any]
+    ) -> None:
+        """Note the names of the results of a C function of the user."""
+        for k, symbol in enumerate(results):
+            self.define(symbol, External(function, tuple(inputs), k))
 
     def derivatives(
         self, value: Any, by: Sequence[Any], symbols: Sequence[Any], shared: Sequence[int]

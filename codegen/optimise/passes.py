@@ -13,8 +13,10 @@ from fractions import Fraction
 
 import mpmath
 
+from softehl.codegen.external_function import ExternalFunction
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op
 from softehl.codegen.graph.precise_arithmetic import number
+from softehl.codegen.graph.routines import External
 from softehl.codegen.graph.traversal import (
     Recursion,
     always,
@@ -66,6 +68,29 @@ def fold(g: Graph, roots: Roots) -> Roots:
 
     def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
         return args[0] if n.op is Op.NAME else g.rebuild(n.op, args, n.payload)
+
+    return rewrite(g, roots, rule)
+
+
+def calls(g: Graph, roots: Roots) -> Roots:
+    """Values and derivatives of a C function of the user by one call.
+
+    The results of a lower order are the first ones of a higher order.
+    """
+    highest: dict[tuple[ExternalFunction, tuple[Node, ...]], External] = {}
+    for n in reachable(roots):
+        if isinstance(n.payload, External):
+            key = n.payload.function, n.args
+            if key not in highest or highest[key].order < n.payload.order:
+                highest[key] = n.payload
+    if not highest:
+        return roots
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        payload = n.payload
+        if isinstance(payload, External):
+            payload = highest[payload.function, n.args]
+        return g.rebuild(n.op, args, payload)
 
     return rewrite(g, roots, rule)
 
@@ -253,6 +278,7 @@ def unrolled(points: Sequence[Sequence[Fraction]], data: tuple[int, int] = (0, 0
 
 STANDARD = (
     Pass("fold", fold),
+    Pass("calls", calls),
     Pass("assume", assume),
     Pass("powers", powers),
     Pass("invariants first", invariants_first),
@@ -269,6 +295,7 @@ def straight_line(
     """The passes of a kernel whose loop over the points is written out."""
     return (
         Pass("fold", fold),
+        Pass("calls", calls),
         Pass("assume", assume),
         Pass("powers", powers),
         Pass("common factors", factor),

@@ -15,7 +15,6 @@ import os
 import platform
 import shlex
 import shutil
-import subprocess
 import sys
 import sysconfig
 import tempfile
@@ -25,6 +24,7 @@ from pathlib import Path
 from time import perf_counter
 
 from softehl.codegen.abi import VERSION, BuildError, NoCompilerError
+from softehl.codegen.c_compiler import called, compiler
 from softehl.codegen.emit import c_runtime
 from softehl.codegen.tools import cache_store
 
@@ -78,18 +78,6 @@ def is_intact(directory: Path) -> bool:
         return recorded[:1] == [_sha256(data)] and signature(directory).encode() in data
     except (OSError, UnicodeDecodeError):
         return False
-
-
-def compiler() -> list[str]:
-    """The C compiler as a command: $CC, or cc from the PATH."""
-    command = os.environ.get("CC", "")
-    try:
-        return shlex.split(command) or ["cc"]
-    except ValueError as error:
-        reason = str(error)[:1].lower() + str(error)[1:]
-        raise BuildError(
-            f"CC={command!r} is no command ({reason}): set CC to a C compiler"
-        ) from None
 
 
 def extra_flags(source: Path, text: str) -> tuple[str, ...]:
@@ -184,7 +172,7 @@ def identification(flags: Sequence[str] = FLAGS) -> str:
     Its predefined macros hold all of that, the instruction set of -march=native included.
     """
     command = [*compiler(), *(f for f in flags if f != "-shared"), "-dM", "-E", "-x", "c", "-"]
-    done = _called(command)
+    done = called(command)
     if done.returncode != 0 or "#define __STDC__" not in done.stdout:
         message = " ".join((done.stderr or done.stdout).split())[:200] or "nothing"
         raise BuildError(
@@ -195,7 +183,7 @@ def identification(flags: Sequence[str] = FLAGS) -> str:
 
 
 def _run(command: Sequence[str], makes: Path) -> None:
-    done = _called(command)
+    done = called(command)
     line = shlex.join(command)
     if done.returncode != 0:
         raise BuildError(f"the C compiler failed ({done.returncode}):\n  {line}\n{done.stderr}")
@@ -203,22 +191,6 @@ def _run(command: Sequence[str], makes: Path) -> None:
         raise BuildError(
             f"{command[0]} is no C compiler (it wrote nothing): set CC to one\n  {line}"
         )
-
-
-def _called(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    if shutil.which(command[0]) is None:
-        kind = BuildError if os.environ.get("CC", "").strip() else NoCompilerError
-        raise kind(
-            f"no C compiler: {command[0]!r} is not on the PATH; install one, or set CC to one"
-        )
-    try:
-        return subprocess.run(
-            command, capture_output=True, text=True, errors="replace", check=False, input=""
-        )
-    except OSError as error:
-        raise BuildError(
-            f"{command[0]} cannot be run ({error.strerror}): set CC to a C compiler"
-        ) from None
 
 
 def _processors() -> int:

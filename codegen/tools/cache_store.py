@@ -28,7 +28,7 @@ from pathlib import Path
 
 from softehl.codegen.tools import cache_dir
 from softehl.codegen.tools.cache_dir import CacheError, require_own, root, writable
-from softehl.codegen.tools.model_text import digest_of
+from softehl.codegen.tools.model_text import BESIDE, digest_of
 from softehl.folder_lock import FolderInUseError, FolderLock
 
 Files = Mapping[str, str]
@@ -54,9 +54,9 @@ def content(files: Files) -> str:
 # ------------------------------------------------------------------------------------- derived C
 
 
-def recall(key: str) -> dict[str, str] | None:
+def recall(key: str, model: Path | None = None) -> dict[str, str] | None:
     """The files stored under a key; None if there are none, they were damaged, or one of the files
-    that they depend on is another one now.
+    that they depend on is another one now. model: file beside which some of these are.
     """
     try:
         derived = root() / "derived"
@@ -64,7 +64,11 @@ def recall(key: str) -> dict[str, str] | None:
             return None
         stored = json.loads((derived / f"{key}.json").read_text(encoding="utf-8"))
         files: dict[str, str] = stored["files"]
-        current = all(digest_of(path) == digest for path, digest in stored["read"].items())
+        folder = "" if model is None else f"{model.resolve().parent}/"
+        current = all(
+            digest_of(path.replace(BESIDE, folder, 1)) == digest
+            for path, digest in stored["read"].items()
+        )
         return files if current and stored["content"] == content(files) else None
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None

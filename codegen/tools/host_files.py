@@ -73,6 +73,7 @@ def files(d: Definition | Law, target: str) -> dict[str, str]:
 
 
 def _states(d: Definition) -> list[State]:
+    random_states.check_external_functions(d)
     return random_states.admissible_states(d, STATES)
 
 

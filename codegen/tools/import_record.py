@@ -45,11 +45,19 @@ class Inputs:
     def beyond(self, path: Path, sources: Mapping[str, str]) -> dict[str, str] | None:
         """Digests of the files that were read, except the `sources` of the model file.
 
-        None where that does not say it all: a file was edited between its digest and its run, or a
-        module came from elsewhere.
+        Those of the folder of the model file are called as seen from there (`model_text.BESIDE`):
+        a copy of the folder elsewhere has files of its own. None where that does not say it all: a
+        file was edited between its digest and its run, or a module came from elsewhere.
         """
         folder = path.resolve().parent
-        others = {p: d for p, d in self.digests.items() if Path(p).resolve() not in self.texts}
+        others = {}
+        for p, d in self.digests.items():
+            place = Path(p).resolve()
+            if place not in self.texts:
+                inside = Path(p).is_absolute() and place.is_relative_to(folder)
+                others[
+                    model_text.BESIDE + place.relative_to(folder).as_posix() if inside else p
+                ] = d
         for file, text in self.texts.items():
             name = file.relative_to(folder).as_posix()
             if name not in sources:

@@ -116,7 +116,9 @@ def _folder_of(
     sources = model_text.sources(source)
     anywhere = _file_key(sources)
     on_cells = _file_key(sources, [*cells, geometry, "materials" if materials else ""])
-    files = (None if materials else store.recall(anywhere)) or store.recall(on_cells)
+    files = (None if materials else store.recall(anywhere, source)) or store.recall(
+        on_cells, source
+    )
     if files is None:
         from softehl.codegen.language.weak_form import CellOptions
         from softehl.codegen.tools import model_loader
@@ -137,7 +139,7 @@ def _for_derivatives(source: Path | Definition | Page | Law, where: CellKey) -> 
         options = [*cells, geometry, "materials" if materials else "", "derivatives"]
         sources = model_text.sources(source)
         key = _file_key(sources, options)
-        files = store.recall(key)
+        files = store.recall(key, source)
         if files is not None:
             return compiled(files)[0]
         from softehl.codegen.language.weak_form import CellOptions
@@ -249,10 +251,13 @@ def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str,
     if files is not None:
         return files, {}
     from softehl.codegen import pipeline
+    from softehl.codegen.graph.partial_derivatives import DifferentiationError
     from softehl.codegen.tools import output_files
+    from softehl.codegen.verify.random_states import check_external_functions
 
     kernels, seconds = [], {}
     for d in definitions:
+        check_external_functions(d)
         start = perf_counter()
         try:
             kernels.append(pipeline.compile_model(d))
@@ -261,6 +266,8 @@ def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str,
                 f"{d.name}: something is divided by a value that is always zero, or a root of it "
                 "is differentiated"
             ) from None
+        except DifferentiationError as error:
+            raise ModelFileError(f"{d.name}: {error}") from None
         seconds[d.name] = perf_counter() - start
     files = output_files.files(kernels)
     store.remember(key, files)

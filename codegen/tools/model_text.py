@@ -9,6 +9,9 @@ from pathlib import Path
 
 from softehl.errors import SoftehlError
 
+BESIDE = "beside the model: "
+"""Beginning of the name of a file that is called as seen from the folder of the model."""
+
 
 class ModelFileError(SoftehlError, ValueError):
     """A model file cannot be used; the message names the file, the line and the remedy."""

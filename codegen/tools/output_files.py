@@ -71,6 +71,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "places": [list(dof) for dof in d.dof_nodes],
         "history": list(d.history),
         **({"internal": list(d.internal)} if d.internal else {}),
+        **({"functions": list(d.functions)} if d.functions else {}),
         **({"cell": d.cell} if d.cell else {}),
         **({"kept": kernel.cached} if kernel.cached else {}),
         "conditions": [[c.name, c.relation, c.bound, c.where] for c in d.conditions],

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -21,13 +22,15 @@ from softehl.codegen.elements.cells import ELEMENTS
 from softehl.codegen.graph.evaluation import State, Walk
 from softehl.codegen.graph.graph import BOOLEAN, Node, Op, Routine
 from softehl.codegen.graph.traversal import reachable
-from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.definition import Definition, functions_of_user
 from softehl.codegen.verify.arithmetics import Doubles
 from softehl.codegen.verify.reference_evaluator import Evaluator
 from softehl.codegen.verify.sympy_program import program
 from softehl.errors import SoftehlError
 
 ATTEMPTS = 40
+STATES = 5
+"""Of the check of derivatives that a user gives."""
 DIGITS = 30
 SPREAD = 0.05
 """Size of the random unknowns, and of the relative variation of what is given."""
@@ -79,6 +82,19 @@ def admissible_states(definition: Definition, count: int) -> list[State]:
             f"one, e.g. m.example({suggestion(definition)})"
         )
     return states
+
+
+def check_external_functions(definition: Definition) -> None:
+    """Compare derivatives of C functions of the user with differences at admissible states.
+
+    Raises `ExternalFunctionError`, and `BuildError` where one cannot be compiled.
+    """
+    functions = set(functions_of_user(definition).values())
+    if functions:
+        with suppress(NoStateError):
+            admissible_states(definition, STATES)
+    for f in functions:
+        f.check()
 
 
 def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:

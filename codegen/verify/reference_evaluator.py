@@ -214,6 +214,8 @@ class Evaluation:
                 return self._solve(s, row, q)
             case "slope":
                 return self._slope(s, q)
+            case "external":
+                return s.content.near([row[a] for a in s.args], n.number)
             case "stretches":
                 squares, energy = s.content
                 stretches = n.eigenvalues([row[a] for a in s.args])

@@ -18,6 +18,7 @@ from sympy.logic.boolalg import BooleanAtom
 
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.sympy_tape import (
+    External,
     Implicit,
     Integral,
     Local,
@@ -158,6 +159,8 @@ class _Builder:
                 parts = (*meaning.unknowns, *meaning.equations, *meaning.start)
             case Principal():
                 parts = (*meaning.squares, meaning.energy, *meaning.entries)
+            case External():
+                parts = meaning.inputs
             case Slope():
                 parts = (meaning.value, meaning.by)
             case _:
@@ -205,6 +208,11 @@ class _Builder:
                 return self._add(
                     "stretches", self._at(*m.entries), (squares, energy[0]), inner=inner
                 )
+            case External():
+                key = ("external", m.function, m.inputs)
+                if key not in self._slots:
+                    self._slots[key] = self._add("external", self._at(*m.inputs), m.function)
+                return self._add("item", (self._slots[key],), m.index)
             case Slope():
                 (value,), (by,) = self._at(m.value), self._at(m.by)
                 inner = self._between((by,), (value,))

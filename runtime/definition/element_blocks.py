@@ -14,13 +14,14 @@ from softehl.runtime.definition.kernel_loading import KernelOrigin
 from softehl.runtime.definition.line_fields import interpolated, placed, require_apart
 from softehl.runtime.definition.problem_definition import (
     Block,
+    Number,
     PageOptions,
     ProblemDefinition,
     StudyError,
 )
 from softehl.runtime.discretisation.dofmap import Slot, slots
 from softehl.runtime.kernels.kernel import Kernel
-from softehl.runtime.kernels.kernel_call import Rule
+from softehl.runtime.kernels.kernel_call import ArgumentError, Rule, address_of
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.interior_facets import cells_at_side, interior
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
@@ -176,9 +177,21 @@ def page_on(
         accelerations={d: s for d, s in accelerations.items() if d not in data},
         initial=_initial(name, kernel, arguments, centres, form.rule),
         parameters={
-            p: parameter(name, p, arguments[p]) for p in kernel.parameters if p in arguments
+            p: parameter_of(kernel, name, p, arguments[p])
+            for p in kernel.parameters
+            if p in arguments
         },
     )
+
+
+def parameter_of(kernel: Kernel, block: str, name: str, value: Any) -> Number:
+    """Value of a parameter of a kernel, or the address of a C function.  Raises StudyError."""
+    if name not in kernel.functions:
+        return parameter(block, name, value)
+    try:
+        return address_of(f"{block!r}: {name}", value)
+    except ArgumentError as error:
+        raise StudyError(str(error)) from None
 
 
 def facet_nodes(kernel: Kernel) -> Integers | None:

@@ -426,6 +426,7 @@ def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
         places=tuple((n, a) for n, a in entry.get("places", ())),
         history=tuple(entry.get("history", ())),
         internal=tuple(entry.get("internal", ())),
+        functions=tuple(entry.get("functions", ())),
         cell=entry.get("cell", ""),
         kept=entry.get("kept", 0),
     )

@@ -5,11 +5,13 @@ The shapes, orders and units of every array are those of `codegen/abi.py`.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import cffi
 import numpy as np
 
 from softehl.runtime.arrays import Array, frozen
@@ -20,7 +22,48 @@ class ArgumentError(KernelError, ValueError):
     """An array has a wrong shape or kind, or a task is not offered."""
 
 
+class FunctionAddress(float):
+    """Address of a C function as a parameter of a kernel; `owner` keeps the function alive."""
+
+    owner: object
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For `pickle`: an address means nothing in another process."""
+        raise TypeError("the address of a C function cannot be pickled: name its source instead")
+
+    def __deepcopy__(self, memo: object) -> FunctionAddress:
+        """Itself."""
+        return self
+
+
+def address_of(name: str, function: Any) -> FunctionAddress:
+    """Return the address of a C function of ctypes, cffi or Numba, or an integer.
+
+    Raises ArgumentError.
+    """
+    if isinstance(function, FunctionAddress):
+        return function
+    number = getattr(function, "address", function)
+    if isinstance(function, _FUNCTION):
+        number = ctypes.cast(function, ctypes.c_void_p).value
+    elif isinstance(function, _ffi.CData):
+        number = int(_ffi.cast("uintptr_t", function))
+    if not isinstance(number, int) or isinstance(number, bool) or number < LOWEST_ADDRESS:
+        raise ArgumentError(
+            f"{name} = {function!r}: give the address of a C function, of ctypes, cffi or Numba, "
+            "or as an integer"
+        )
+    address = FunctionAddress(number)
+    address.owner = function
+    return address
+
+
 _NOTHING = np.empty(0)
+_ffi = cffi.FFI()
+_FUNCTION: type = ctypes.CFUNCTYPE(None).__mro__[1]
+"""Type of the functions of ctypes."""
+LOWEST_ADDRESS = 4096
+"""No function lies below."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +110,9 @@ class Family:
     data (n, len(data)), point_data (n, points, len(point_data)), parameters (len(parameters),) or
     a mapping by name, rule None for the model's default (the only one when `unrolled`).
     places: of every unknown its name without number, and its node or None. history: point data
-    whose new values the last fields are. internal: unknowns of one element alone. cell: on which a
-    page of fields stands. kept: numbers that products by sum factorisation keep at a point, 0 where
-    the family has none.
+    whose new values the last fields are. internal: unknowns of one element alone. functions:
+    parameters that are addresses of C functions. cell: on which a page of fields stands. kept:
+    numbers that products by sum factorisation keep at a point, 0 where the family has none.
     """
 
     name: str
@@ -91,6 +134,7 @@ class Family:
     places: tuple[tuple[str, int | None], ...] = ()
     history: tuple[str, ...] = ()
     internal: tuple[str, ...] = ()
+    functions: tuple[str, ...] = ()
     cell: str = ""
     kept: int = 0
 
@@ -227,7 +271,11 @@ class Call:
         missing = [p for p in self.kernel.parameters if p not in parameters]
         if missing:
             raise ArgumentError(f"{self.kernel.name} needs {', '.join(missing)}")
-        return [parameters[p] for p in self.kernel.parameters]
+        functions = self.kernel.functions
+        return [
+            address_of(p, parameters[p]) if p in functions else parameters[p]
+            for p in self.kernel.parameters
+        ]
 
     def _array(self, what: str, value: Any, shape: tuple[int, ...]) -> Array:
         if isinstance(value, np.ma.MaskedArray):

@@ -85,11 +85,14 @@ def _blocks(definition: ProblemDefinition, owner: str) -> list[Block]:
 
 def _of_page(owner: str, name: str, blocks: list[Block]) -> Input:
     kernel = blocks[0].kernel
+    if name in kernel.functions:
+        raise StudyError(f"by: {name!r} of {owner!r} is a C function, not a number")
     if name in blocks[0].parameters:
         return PageParameter((owner, name), blocks)
     if name in blocks[0].data:
         return PageDatum((owner, name), blocks)
-    names = [*blocks[0].parameters, *blocks[0].data]
+    numbers = [n for n in blocks[0].parameters if n not in kernel.functions]
+    names = [*numbers, *blocks[0].data]
     raise StudyError(
         f"by: {owner!r} ({kernel.name}) has no {name!r}{did_you_mean(name, names)}; it has "
         f"{join_names(names)}"
