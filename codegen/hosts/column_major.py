@@ -6,14 +6,18 @@ d residual_i / d u_j, which is the transpose of the memory of C.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from softehl.codegen.abi import Task
+from softehl.codegen.abi import TargetError, Task
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts.c_library import sample_arrays
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.test_states import Sample, renewed
+
+LETTERS = 63
+"""Longest name of Fortran 2018 and of MATLAB."""
 
 
 @dataclass(frozen=True)
@@ -76,3 +80,52 @@ def sample_text(interface: ElementInterface, references: Sequence[Sample]) -> st
     lines = [str(len(references))]
     lines += [" ".join(repr(float(v)) for row in rows for v in row) for rows in arrays.values()]
     return "\n".join(line for line in lines if line) + "\n"
+
+
+def procedures(interface: ElementInterface) -> list[str]:
+    """Functions of a model: its tasks, and `commit` where it has history."""
+    return [*interface.tasks, *(["commit"] if c_interface.commits(interface) else [])]
+
+
+def solves(interface: ElementInterface) -> bool:
+    """True for an element with unknowns at nodes of a standard cell: a patch can be solved."""
+    return interface.cell is not None and not interface.free and Task.TANGENT in interface.tasks
+
+
+def lists(interface: ElementInterface, task: str) -> tuple[list[Array], list[Array]]:
+    """Inputs and results of a function."""
+    given = inputs(interface)
+    if task != "commit":
+        return [*given, *direction(interface, task)], results(interface, task)
+    return results(interface, Task.FIELDS), [a for a in given if a.name == "data"]
+
+
+def expected(interface: ElementInterface) -> list[Array]:
+    """Arrays of values.txt behind the arguments, in its order."""
+    wanted = {a.name: a for t in interface.tasks for a in results(interface, t)}
+    found = [a for k in ("energy", "residual", "tangent", "fields") if (a := wanted.get(k))]
+    if c_interface.commits(interface):
+        shape = next(a.shape for a in inputs(interface) if a.name == "data")
+        found.append(Array("renewed", shape, "data after a step"))
+    return found
+
+
+def array_rows(interface: ElementInterface) -> str:
+    """Rows of a table of arrays and shapes."""
+    rows = [row for t in interface.tasks for row in lists(interface, t)]
+    arrays = {a.name: a for row in rows for a in row}
+    return "\n".join(f"| `{a.name}` | {bounds(a)} | {a.meaning} |" for a in arrays.values())
+
+
+def bounds(a: Array) -> str:
+    """Sizes of an argument with n elements, with commas."""
+    return ", ".join([*map(str, a.shape), *(["n"] if a.each else [])])
+
+
+def require_name(name: str, host: str) -> None:
+    """Raise `TargetError` for a name that Fortran and MATLAB do not have."""
+    if len(name) > LETTERS or not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+        raise TargetError(
+            f"target {host} has no name {name[:70]}: names begin with a letter and have at most "
+            f"{LETTERS}; rename the page"
+        )

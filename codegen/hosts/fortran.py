@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 from softehl.codegen.abi import TargetError, Task
@@ -10,15 +9,12 @@ from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, column_major, patch_mesh
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
-from softehl.codegen.hosts.column_major import Array
+from softehl.codegen.hosts.column_major import Array, bounds
 from softehl.codegen.hosts.element_common import IN_FORTRAN, arguments
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.material_response import at_one_point
 from softehl.codegen.hosts.registry import Host
 from softehl.codegen.hosts.test_states import Sample, samples
-
-LETTERS = 63
-"""Longest name of Fortran 2018."""
 
 
 def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
@@ -26,14 +22,14 @@ def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, st
     _check_names(interface)
     texts, kernel = c_interface.files(interface)
     references = samples(interface, kernel, host.with_time_step(interface, states))
-    solves = _solves(interface)
+    solves = column_major.solves(interface)
     substitutions = {
         "name": interface.name,
-        "tasks": ", ".join(f"`{interface.name}_{t}`" for t in _procedures(interface)),
+        "tasks": ", ".join(f"`{interface.name}_{t}`" for t in column_major.procedures(interface)),
         "example": "call " + _call(interface, _first_task(interface)),
         "host": " host" if solves else "",
         "inputs": ", ".join(a.name for a in column_major.inputs(interface)),
-        "arrays": _array_rows(interface),
+        "arrays": column_major.array_rows(interface),
     }
     texts[f"{interface.name}.f90"] = source(interface)
     texts["values.txt"] = column_major.sample_text(interface, references)
@@ -52,13 +48,9 @@ FORTRAN = Host(element=module, material=at_one_point(module))
 def _check_names(interface: ElementInterface) -> None:
     """Refuse names that Fortran cannot tell apart or hold."""
     seen: dict[str, str] = {}
-    for task in _procedures(interface):
+    for task in column_major.procedures(interface):
         name = f"{interface.name}_{task}"
-        if len(name) > LETTERS or not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
-            raise TargetError(
-                f"target fortran has no name {name[:70]}: names begin with a letter and have at "
-                f"most {LETTERS}; rename the page"
-            )
+        column_major.require_name(name, "fortran")
         if name.lower() in seen:
             raise TargetError(
                 f"{interface.name} offers {task} and {seen[name.lower()]}, which are one name in "
@@ -67,44 +59,14 @@ def _check_names(interface: ElementInterface) -> None:
         seen[name.lower()] = task
 
 
-def _procedures(interface: ElementInterface) -> list[str]:
-    return [*interface.tasks, *(["commit"] if c_interface.commits(interface) else [])]
-
-
-def _solves(interface: ElementInterface) -> bool:
-    """True for an element with unknowns at nodes of a standard cell: a patch can be solved."""
-    return interface.cell is not None and not interface.free and Task.TANGENT in interface.tasks
-
-
 def _first_task(interface: ElementInterface) -> str:
     order = (Task.TANGENT, Task.RESIDUAL, Task.ENERGY, Task.FIELDS)
     return next((t for t in order if t in interface.tasks), interface.tasks[0])
 
 
-def _lists(interface: ElementInterface, task: str) -> tuple[list[Array], list[Array]]:
-    """Inputs and results of a procedure of the module."""
-    given = column_major.inputs(interface)
-    if task != "commit":
-        more = column_major.direction(interface, task)
-        return [*given, *more], column_major.results(interface, task)
-    fields = column_major.results(interface, Task.FIELDS)
-    return fields, [a for a in given if a.name == "data"]
-
-
 def _call(interface: ElementInterface, task: str) -> str:
-    given, results = _lists(interface, task)
+    given, results = column_major.lists(interface, task)
     return f"{interface.name}_{task}({', '.join(a.name for a in [*given, *results])})"
-
-
-def _array_rows(interface: ElementInterface) -> str:
-    """Rows of a table of arrays and shapes."""
-    rows = [row for t in interface.tasks for row in _lists(interface, t)]
-    arrays = {a.name: a for row in rows for a in row}
-    return "\n".join(f"| `{a.name}` | {_bounds(a)} | {a.meaning} |" for a in arrays.values())
-
-
-def _bounds(a: Array) -> str:
-    return ", ".join([*map(str, a.shape), *(["n"] if a.each else [])])
 
 
 def source(interface: ElementInterface) -> str:
@@ -115,7 +77,7 @@ def source(interface: ElementInterface) -> str:
         f"  integer, parameter, public :: {interface.name}_n_{k.lower()} = {v}"
         for k, v in c_interface.sizes(interface).items()
     ]
-    tasks = _procedures(interface)
+    tasks = column_major.procedures(interface)
     public = [f"  public :: {interface.name}_{t}" for t in tasks]
     return "\n".join(
         [
@@ -150,7 +112,7 @@ _C_ARGUMENTS = ("X", "u", "data", "p")
 
 def _interface(interface: ElementInterface, task: str) -> str:
     """Interface of a C function, with arrays of assumed size."""
-    given, results = _lists(interface, task)
+    given, results = column_major.lists(interface, task)
     inputs = [a.name for a in given] if task == "commit" else [*_C_ARGUMENTS]
     inputs += [a.name for a in column_major.direction(interface, task)]
     names = ", ".join(["n", *inputs, *(a.name for a in results)])
@@ -176,7 +138,7 @@ def _declared(a: Array, intent: str) -> str:
 
 def _procedure(interface: ElementInterface, task: str) -> str:
     """A procedure of the module: checks shapes, calls C, turns the tangent."""
-    given, results = _lists(interface, task)
+    given, results = column_major.lists(interface, task)
     name, arrays = f"{interface.name}_{task}", [*given, *results]
     counted = "fields" if task == "commit" else "u"
     passed = {a.name for a in arrays}
@@ -186,7 +148,7 @@ def _procedure(interface: ElementInterface, task: str) -> str:
     turned = any(a.name == "tangent" for a in results) and not interface.symmetric
     counted_rank = 3 if task == "commit" else 2
     lines = [
-        f"  ! {'; '.join(f'{a.name}({_bounds(a)}): {a.meaning}' for a in results)}.",
+        f"  ! {'; '.join(f'{a.name}({bounds(a)}): {a.meaning}' for a in results)}.",
         f"  subroutine {_call(interface, task)}",
         *(_declared(a, "in") for a in given),
         *(_declared(a, "inout" if task == "commit" else "out") for a in results),
@@ -194,7 +156,7 @@ def _procedure(interface: ElementInterface, task: str) -> str:
         *(["    real(c_double) :: none(1)"] if "none" in actual else []),
         f"    n = size({counted}, {counted_rank})",
         *(
-            f"    call check_shape('{name}', '{a.name}', shape({a.name}), [{_bounds(a)}])"
+            f"    call check_shape('{name}', '{a.name}', shape({a.name}), [{bounds(a)}])"
             for a in arrays
         ),
         *(["    none = 0"] if "none" in actual else []),
@@ -225,7 +187,7 @@ def _wrapped(texts: Sequence[str], width: int) -> str:
 def example(interface: ElementInterface, first: Sample) -> str:
     """Example program that calls one function for one element and prints the result."""
     task = _first_task(interface)
-    given, results = _lists(interface, task)
+    given, results = column_major.lists(interface, task)
     s = first.state
     values = {"X": s.coordinates, "u": s.dofs, "data": first.data, "p": s.parameters}
     declared = [
@@ -258,11 +220,7 @@ def example(interface: ElementInterface, first: Sample) -> str:
 def test(interface: ElementInterface) -> str:
     """The test program."""
     given = column_major.inputs(interface)
-    wanted = {a.name: a for t in interface.tasks if t in _EXPECTED for a in _lists(interface, t)[1]}
-    order = [a for k in ("energy", "residual", "tangent", "fields") if (a := wanted.get(k))]
-    data = next((a for a in given if a.name == "data"), None)
-    if c_interface.commits(interface) and data is not None:
-        order.append(Array("renewed", data.shape, "data after a step"))
+    order = column_major.expected(interface)
     declared, read, spread = [], [], []
     for a in given:
         shape = ", ".join(map(str, a.shape))
@@ -276,7 +234,7 @@ def test(interface: ElementInterface) -> str:
         read.append(f"  read (file, *) page_{a.name}")
     for a in order:
         declared.append(f"  real(real8), allocatable :: page_{a.name}({_colons(a)})")
-        read.append(f"  allocate (page_{a.name}({_bounds(a).replace('n', 'samples')}))")
+        read.append(f"  allocate (page_{a.name}({bounds(a).replace('n', 'samples')}))")
         read.append(f"  read (file, *) page_{a.name}")
     if any(a.name == "p" for a in given):
         read.append("  p = page_p")

@@ -28,6 +28,7 @@ BUILT_IN = {
     "c": "softehl.codegen.hosts.c_library:C",
     "cpp": "softehl.codegen.hosts.c_library:CPP",
     "fortran": "softehl.codegen.hosts.fortran:FORTRAN",
+    "matlab": "softehl.codegen.hosts.matlab:MATLAB",
     "abaqus": "softehl.codegen.hosts.abaqus_material:ABAQUS",
     "calculix": "softehl.codegen.hosts.calculix:CALCULIX",
     "jax": "softehl.codegen.hosts.jax:JAX",
