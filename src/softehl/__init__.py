@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from softehl.runtime.parallel.matrix_free import MatrixFree
     from softehl.runtime.parallel.petsc import Petsc
     from softehl.runtime.results.result import Modes, ModeShape, Result
+    from softehl.runtime.results.tensors import principal_values, von_mises
     from softehl.runtime.solve.arclength import Arclength
     from softehl.runtime.solve.continuation import Continuation, StepRule
     from softehl.runtime.solve.eigen import NoModes
@@ -173,9 +174,11 @@ _PUBLIC = {
     "System": "softehl.runtime.equations.system",
     "UnstableState": "softehl.runtime.equations.stability",
     "main": "softehl.__main__",
+    "principal_values": "softehl.runtime.results.tensors",
     "processes": "softehl.cases.harness.process_pool",
     "run_oring": "softehl.cases.oring",
     "solve_cases": "softehl.cases.shipped",
+    "von_mises": "softehl.runtime.results.tensors",
 }
 _MODELLING = {
     "BuildError": "softehl.codegen.abi",
@@ -296,11 +299,13 @@ __all__ = [
     "main",
     "material",
     "page",
+    "principal_values",
     "processes",
     "quadrature",
     "run_oring",
     "shapes",
     "solve_cases",
+    "von_mises",
 ]
 
 

@@ -14,7 +14,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.kernel import Rule
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.interior_facets import split
-from softehl.runtime.results.recovery import projection
+from softehl.runtime.results.recovery import projection, recover_by_patches
 from softehl.runtime.results.result import Result
 from softehl.runtime.study import StudyError
 
@@ -56,14 +56,20 @@ def slope(x: Array) -> Array:
     return 1.5 * np.cos(1.5 * x[:, 0] + x[:, 1]) * np.exp(0.5 * x[:, -1])
 
 
-def recovered(kind: str, n: int) -> float:
-    """Largest error at nodes of the slope of the interpolated wave."""
+def slopes(kind: str, n: int) -> tuple[Mesh, Array]:
+    """Slope of the interpolated wave at the points of a bent mesh, (cells, points)."""
     mesh, cell, rule = meshed(kind, n), CELLS[kind], rule_of(kind)
     nodes = mesh.cells[kind]
     at = cell.gradient(rule.points)
     J = np.einsum("qkd,nkc->nqcd", at, mesh.points[nodes])
     along = np.einsum("qkd,nk->nqd", at, wave(mesh.points)[nodes])
-    values = np.linalg.solve(np.swapaxes(J, 2, 3), along[..., None])[:, :, 0, 0]
+    return mesh, np.linalg.solve(np.swapaxes(J, 2, 3), along[..., None])[:, :, 0, 0]
+
+
+def recovered(kind: str, n: int) -> float:
+    """Largest error of its projection at nodes."""
+    mesh, values = slopes(kind, n)
+    cell, rule, nodes = CELLS[kind], rule_of(kind), mesh.cells[kind]
     there = values @ projection(cell, rule, max(cell.order - 1, 1)).T
     count = np.bincount(nodes.ravel())
     mean = np.bincount(nodes.ravel(), there.ravel()) / count
@@ -76,6 +82,45 @@ def test_recovered_slopes_converge_with_the_order_of_the_cell(kind: str) -> None
     n = {1: 16, 2: 8}.get(order, 4) if flat else {1: 5, 2: 3}.get(order, 2)
     fitted = np.log2(recovered(kind, n) / recovered(kind, 2 * n))
     assert fitted > order - 0.35, fitted
+
+
+def recovered_by_patches(kind: str, n: int) -> float:
+    """Root mean square error of the patches at nodes."""
+    mesh, values = slopes(kind, n)
+    cell, rule, nodes = CELLS[kind], rule_of(kind), mesh.cells[kind]
+    found = recover_by_patches(cell, rule, nodes, mesh.points, values[..., None])[:, 0]
+    return float(np.sqrt(np.mean((found - slope(mesh.points)) ** 2)))
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        *("tri3", "quad4", "quad9", "wedge6", "tet4"),
+        *(pytest.param(k, marks=pytest.mark.slow) for k in ("tri6", "quad8", "quad16", "quad25")),
+        *(pytest.param(k, marks=pytest.mark.slow) for k in ("hex8", "hex20", "hex27", "hex64")),
+    ],
+)
+def test_patches_have_one_order_more(kind: str) -> None:
+    order, flat = CELLS[kind].order, CELLS[kind].dimension == 2
+    n = {1: 16, 2: 8}.get(order, 4) if flat else {1: 5, 2: 3}.get(order, 2)
+    fitted = np.log2(recovered_by_patches(kind, n) / recovered_by_patches(kind, 2 * n))
+    assert fitted > order + (0.3 if kind == "tri6" else 0.85), fitted
+
+
+def test_polynomials_of_the_degree_of_the_cell_are_exact_by_patches() -> None:
+    """Also in corners, at boundaries, and in bodies of one cell, where the degree is lower."""
+    cases = [("quad9", 4, 2), ("tri3", 3, 1), ("hex8", 3, 1), ("quad9", 1, 1), ("hex27", 1, 1)]
+    for kind, n, degree in cases:
+        cell, rule, d = CELLS[kind], rule_of(kind), CELLS[kind].dimension
+        flat = Mesh.rectangle(1.0, 1.0, cells=(n, n), **MESHES[kind]) if d == 2 else None
+        mesh = flat or Mesh.box((1.0, 1.0, 1.0), cells=(n, n, n), **MESHES[kind])
+        mesh = mesh.map(lambda x, d=d: x @ (np.eye(d) + 0.3 * np.eye(d, k=1)) * 0.01)
+        nodes, power = mesh.cells[kind], 100 * (np.arange(d) + 1.0)
+        places = np.einsum("qk,nkd->nqd", cell.shape(rule.points), mesh.points[nodes])
+        values = (places @ power + 1.0)[..., None] ** degree
+        found = recover_by_patches(cell, rule, nodes, mesh.points, values)[:, 0]
+        exact = (mesh.points @ power + 1.0) ** degree
+        np.testing.assert_allclose(found, exact, rtol=1e-10, err_msg=f"{kind} {n}")
 
 
 def test_polynomials_one_degree_below_the_cell_are_exact_at_its_nodes() -> None:
@@ -140,8 +185,10 @@ def test_bending_of_one_cell_through_the_thickness(given: Any, tmp_path: Path) -
     assert "u_x" not in line
     with pytest.raises(KeyError, match=r"no block 'beem'.*did you mean 'beam'"):
         result.at_nodes("beem")
-    with pytest.raises(StudyError, match="recovery = 'spr': allowed are 'projection', 'mean'"):
-        result.at_nodes("beam", recovery="spr")
+    spr = result.at_nodes("beam", recovery="spr")["sigma_xx"]
+    np.testing.assert_allclose(spr, exact, atol=1e-10)  # one cell through the thickness
+    with pytest.raises(StudyError, match="recovery = 'zz': allowed are 'projection', 'mean', 'spr"):
+        result.at_nodes("beam", recovery="zz")
 
 
 def kirsch(x: Array) -> tuple[Array, Array, Array]:
@@ -186,6 +233,12 @@ def test_stress_at_a_hole() -> None:
     found = result.at_nodes("plate")["sigma_xx"][top]
     assert found == pytest.approx(3.0, rel=0.01)
     assert result.at_nodes("plate", recovery="mean")["sigma_xx"][top] < 2.7
+    spr = result.at_nodes("plate", recovery="spr")
+    assert spr["sigma_xx"][top] == pytest.approx(3.0, rel=0.01)
+    inside = np.linalg.norm(result.system.mesh.points, axis=1) > 1.5
+    projected, exact = result.at_nodes("plate"), kirsch(result.system.mesh.points)[0]
+    error = [abs(f["sigma_xx"] - exact)[inside].max() for f in (spr, projected)]
+    assert error[0] < 0.7 * error[1]
 
 
 def test_nodes_of_two_materials_have_the_values_of_each() -> None:
