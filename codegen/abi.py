@@ -22,7 +22,8 @@ not overlap.  Units are those of the model's model (mm, MPa, N, s in the shipped
 | `data`        | n, ndata +           | constants of each element, in the manifest's order; then |
 |               | points * npoint      | those of each of its points (history, ...), point by     |
 |               |                      | point                                                    |
-| `parameters`  | nparameters          | constants of the call, in the manifest's order           |
+| `parameters`  | nparameters          | constants of the call, in the manifest's order; then its |
+|               |                      | run-time arrays, see below                               |
 | `direction`   | n, ndof              | vector that task `product` multiplies by the tangent     |
 |               | n, ncoordinates +    | variation of an element that the tasks `pseudo_load` and |
 |               | ndata + nparameters  | `fields_rate` follow: of its coordinates, its data (not  |
@@ -48,6 +49,11 @@ not overlap.  Units are those of the model's model (mm, MPa, N, s in the shipped
 | `fields_rate` | n, points, nfields: derivative of the fields along a       |
 |               | variation of all that they depend on                       |
 
+Run-time arrays (`Definition.arrays`: curves, weights of networks) are the same for all elements of
+a call, and stand in `parameters` behind the constants: first three numbers for each, its place in
+`parameters`, its length, and the place of its rate or 0; then the arrays, and the rates of those
+that move. Tasks `pseudo_load` and `fields_rate` follow these rates too, of their `direction`
+nothing changes. The other tasks do not read rates.
 Pointers that a family does not use (no data, no basis, no parameters, no tangent) may be NULL.
 A kernel keeps no state, allocates nothing, reports nothing: a value outside the model's domain
 comes out as not-a-number.  An element in which a local iteration (`Model.implicit`) finds no
@@ -161,6 +167,10 @@ VERTEX_ORDER = {
 The nodes are in the order of `elements.cells`. The elements quad8, hex20, wedge15
 and pyramid5 have no counterpart: basix knows their functions, but not by values at nodes.
 """
+
+
+ARRAY_ENTRIES = 3
+"""Numbers of a run-time array in front of all arrays: place, length, place of its rate or 0."""
 
 
 def derivative_task(name: str) -> str:

@@ -131,8 +131,8 @@ def unknown_seeds(d: Definition, first: int) -> dict[Node, Node]:
 
 
 def argument_seeds(d: Definition) -> dict[Node, Node]:
-    """Coordinates, data and parameters that move along `direction`, in this order, and point data
-    that move as the model says.
+    """Coordinates, data and parameters that move along `direction`, in this order, point data that
+    move as the model says, and run-time arrays that move at their rates.
     """
     widths = {
         "coordinates": d.coordinate_width,
@@ -146,6 +146,7 @@ def argument_seeds(d: Definition) -> dict[Node, Node]:
     for k, varying in product(range(half), (False, True)):
         value = g.input("point data", k, varying=varying)
         seeds[value] = g.input("point data", half + k, varying=varying)
+    seeds |= {g.input("arrays", k): g.one for k in range(len(d.arrays))}
     return seeds
 
 

@@ -163,6 +163,7 @@ _ARRAYS = {
     "external": "p[{}]",
     "interpolated": "p{}",
     "interpolated direction": "t{}",
+    "arrays": "0.0",
 }
 
 _LONG = 64
@@ -265,7 +266,10 @@ class Printer:
         operands = ", ".join(self.ref(a) for a in n.args) or "0.0"
         name = f"{abi.PREFIX}_{self.d.name}_{routine.name}"
         self.line(depth, f"double {self.fresh(n)}[{routine.outputs}];")
-        self.line(depth, f"failed |= {name}((const double[]){{{operands}}}, {self.ref(n)});")
+        arrays = "parameters, " if self.d.arrays else ""
+        self.line(
+            depth, f"failed |= {name}({arrays}(const double[]){{{operands}}}, {self.ref(n)});"
+        )
 
     def expression(self, n: Node) -> str:
         if isinstance(n.payload, ResultIndex):

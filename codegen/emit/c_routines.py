@@ -13,6 +13,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Sequence
 
+from softehl.codegen.emit import array_routines
 from softehl.codegen.emit.c_printer import Printer, number
 from softehl.codegen.emit.code_motion import schedule
 from softehl.codegen.external_function import LOWEST_ADDRESS
@@ -25,6 +26,7 @@ from softehl.codegen.graph.routines import (
     Newton,
     derivatives_of_energy,
 )
+from softehl.codegen.graph.run_time_arrays import ArrayRoutine
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
@@ -87,7 +89,7 @@ _CLOSE[Op.ERFC] = _CLOSE[Op.ERF].replace("softehl", "-softehl")
 _ANGLE = """/* The turn from (w, v) to (x, y) has the sine y w - x v and the cosine x w + y v,
    except across the cut of atan2. */
 {signature}{{
-    const double y = p[0], x = p[1], v = p[2], w = p[3], f = p[4], g = p[5];
+{unused}    const double y = p[0], x = p[1], v = p[2], w = p[3], f = p[4], g = p[5];
     const double sine = y * w - x * v, cosine = x * w + y * v, turn = atan2(sine, cosine);
     if (sine == 0.0 && cosine > 0.0)
         s[0] = p[6] / cosine;
@@ -118,12 +120,13 @@ static double softehl_mean_bell(double u, double v)
 """
 
 
-def quotient(op: Op, signature: str) -> list[str]:
-    """C function of a `Quotient` and its callees, callees first."""
+def quotient(op: Op, signature: str, unused: str = "") -> list[str]:
+    """C function of a `Quotient` and its callees, callees first; unused: its first statement."""
     if op is Op.ATAN2:
-        return [_ANGLE.format(signature=signature)]
+        return [_ANGLE.format(signature=signature, unused=unused)]
     text = f"""/* ({op}(u) - {op}(v)) / (u - v) */
 {signature}{{
+{unused}\
     const double u = p[0], v = p[1], f = p[2], g = p[3], d = u - v;
     (void)f, (void)g;
     if (fabs(f - g) > 0.25 * (fabs(f) + fabs(g))) {{
@@ -163,14 +166,27 @@ def _text(d: Definition, r: Routine) -> list[str]:
         case Isotropic():
             return [_JACOBI, *_isotropic(d, r)]
         case Quotient():
-            return quotient(r.op, _signature(d, r))
+            return quotient(r.op, _signature(d, r), arrays_unused(d))
+        case ArrayRoutine():
+            return array_routines.single(d, r, _signature(d, r))
         case External():
             return _external(d, r)
     raise TypeError(f"no C for {r}")
 
 
 def _signature(d: Definition, r: Routine) -> str:
-    return f"static int softehl_{d.name}_{r.name}(const double *restrict p, double *restrict s)\n"
+    name = f"softehl_{d.name}_{r.name}"
+    if d.arrays:
+        return (
+            f"static int {name}(\n    const double *restrict parameters, const double *restrict p, "
+            "double *restrict s)\n"
+        )
+    return f"static int {name}(const double *restrict p, double *restrict s)\n"
+
+
+def arrays_unused(d: Definition) -> str:
+    """Statement for a routine that may read no array of a model with some."""
+    return "    (void)parameters;\n" if d.arrays else ""
 
 
 class Body:
@@ -212,7 +228,7 @@ def _newton(d: Definition, r: Newton) -> list[str]:
     control, size = r.control, number(float(r.control.size))
     text = f"""/* {r.name}: {n} local unknowns, at most {control.iterations} Newton steps */
 {_signature(d, r)}{{
-    int failed = 0;
+{arrays_unused(d)}    int failed = 0;
     const double tolerance = {number(float(control.tolerance))};
     double before[{n}];
     for (int k = 0; k < {n}; ++k) s[k] = p[{first} + k], before[k] = HUGE_VAL;
@@ -246,7 +262,7 @@ def _newton(d: Definition, r: Newton) -> list[str]:
 def _inverse(d: Definition, r: Inverse) -> str:
     n = r.size
     return f"""{_signature(d, r)}{{
-    double A[{n * n}];
+{arrays_unused(d)}    double A[{n * n}];
     for (int k = 0; k < {n * n}; ++k) A[k] = p[k], s[k] = k % {n + 1} == 0;
     if (!softehl_eliminate({n}, A, {n}, s)) return 0;
     for (int k = 0; k < {n * n}; ++k) s[k] = NAN;
@@ -274,7 +290,7 @@ static int {name}(int order, const double *restrict p, double *restrict s)
         *texts,
         f"""/* {r.name}: {f.name} of the user, derivatives up to order {r.order} */
 {_signature(d, r)}{{
-    if (!{name}({r.order}, p, s)) return 0;
+{arrays_unused(d)}    if (!{name}({r.order}, p, s)) return 0;
     for (int k = 0; k < {r.outputs}; ++k) s[k] = NAN;
     return 1;
 }}
@@ -285,11 +301,12 @@ static int {name}(int order, const double *restrict p, double *restrict s)
 def _isotropic(d: Definition, r: Isotropic) -> list[str]:
     body = Body(d, d.graph, derivatives_of_energy(d.graph, r), Printer(d))
     name = f"softehl_{d.name}_{r.name}_of_eigenvalues"
+    arrays, head = ("parameters, ", "const double *restrict parameters, ") if d.arrays else ("", "")
     local = f"""/* {r.name}: {_CONTENT[r.order]} by the eigenvalues */
 static int {name}(
-    const double *restrict s, const double *restrict p, double *restrict w)
+    {head}const double *restrict s, const double *restrict p, double *restrict w)
 {{
-    int failed = 0;
+{arrays_unused(d)}    int failed = 0;
     (void)s, (void)p;
 {body.text(1, [f"w[{k}]" for k in range(len(body.roots))])}
     return failed;
@@ -297,7 +314,7 @@ static int {name}(
 """
     text = f"""{_signature(d, r)}{{
     double c[3], Q[9], w[{len(body.roots)}];
-    if (softehl_eigenvalues(p, c, Q) || {name}(c, p + 6, w)) {{
+    if (softehl_eigenvalues(p, c, Q) || {name}({arrays}c, p + 6, w)) {{
         for (int k = 0; k < {r.outputs}; ++k) s[k] = NAN;
         return 1;
     }}

@@ -18,7 +18,7 @@ from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 
 FUNCTIONS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS}) | ELEMENTARY
-_SAME = ("parameters", "rule")
+_SAME = ("parameters", "rule", "arrays")
 _LETTERS = {
     "coordinates": "X",
     "dofs": "d",
@@ -118,7 +118,10 @@ class LanePrinter(Printer):
         name = f"{abi.PREFIX}_{self.d.name}_{routine.name}_lanes"
         mask = self.active or "softehl_mask(1)"
         self.line(depth, f"V {self.fresh(n)}[{routine.outputs}];")
-        self.line(depth, f"{name}({mask}, (const V[]){{{operands}}}, {self.ref(n)}, &failed);")
+        arrays = "parameters, " if self.d.arrays else ""
+        self.line(
+            depth, f"{name}({mask}, {arrays}(const V[]){{{operands}}}, {self.ref(n)}, &failed);"
+        )
 
     def branch(self, depth: int, s: If) -> None:
         if self.is_scalar(s.condition):

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from softehl.codegen.emit import c_routines
+from softehl.codegen.emit import array_routines, c_routines
 from softehl.codegen.emit.c_printer import number
 from softehl.codegen.emit.simd_printer import LanePrinter
 from softehl.codegen.graph.graph import Routine
 from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton
+from softehl.codegen.graph.run_time_arrays import ArrayRoutine, Network
 from softehl.codegen.language.definition import Definition
 
 
@@ -29,12 +30,18 @@ def _text(d: Definition, r: Routine) -> list[str]:
             return [_inverse(d, r)]
         case Isotropic() | External():
             return [*c_routines.texts(d, [r]), _one_by_one(d, r)]
+        case Network():
+            return array_routines.lanes(d, r, _signature(d, r))
+        case ArrayRoutine():
+            return [*c_routines.texts(d, [r]), _one_by_one(d, r)]
     raise TypeError(f"no C for {r}")
 
 
 def _signature(d: Definition, r: Routine) -> str:
     name = f"softehl_{d.name}_{r.name}_lanes"
-    return f"static void {name}(\n    M active, const V *restrict p, V *restrict s, M *lost)\n"
+    arrays = "const double *restrict parameters, " if d.arrays else ""
+    arguments = f"M active, {arrays}const V *restrict p, V *restrict s, M *lost"
+    return f"static void {name}(\n    {arguments})\n"
 
 
 def _newton(d: Definition, r: Newton) -> list[str]:
@@ -45,7 +52,7 @@ def _newton(d: Definition, r: Newton) -> list[str]:
     control, size = r.control, number(float(r.control.size))
     text = f"""/* {r.name}: {n} local unknowns, at most {control.iterations} Newton steps */
 {_signature(d, r)}{{
-    const double tolerance = {number(float(control.tolerance))};
+{c_routines.arrays_unused(d)}    const double tolerance = {number(float(control.tolerance))};
     M spoilt = softehl_mask(0);
     V before[{n}];
     for (int k = 0; k < {n}; ++k) s[k] = p[{first} + k], before[k] = softehl_splat(HUGE_VAL);
@@ -88,7 +95,7 @@ def _newton(d: Definition, r: Newton) -> list[str]:
 def _inverse(d: Definition, r: Inverse) -> str:
     n = r.size
     return f"""{_signature(d, r)}{{
-    V A[{n * n}];
+{c_routines.arrays_unused(d)}    V A[{n * n}];
     for (int k = 0; k < {n * n}; ++k) A[k] = p[k], s[k] = softehl_splat(k % {n + 1} == 0);
     const M spoilt = active & softehl_eliminate_lanes({n}, A, {n}, s);
     for (int k = 0; k < {n * n}; ++k) s[k] = softehl_blend(spoilt, softehl_splat(NAN), s[k]);
@@ -99,12 +106,13 @@ def _inverse(d: Definition, r: Inverse) -> str:
 
 def _one_by_one(d: Definition, r: Routine) -> str:
     """A routine of one element called for each lane that wants it."""
+    arrays = "parameters, " if d.arrays else ""
     return f"""{_signature(d, r)}{{
     for (int l = 0; l < SOFTEHL_LANES; ++l) {{
         double one[{max(r.inputs, 1)}], out[{r.outputs}];
         for (int k = 0; k < {r.inputs}; ++k) one[k] = softehl_lane(p[k], l);
         for (int k = 0; k < {r.outputs}; ++k) out[k] = NAN;
-        if (softehl_lane(active, l) && softehl_{d.name}_{r.name}(one, out))
+        if (softehl_lane(active, l) && softehl_{d.name}_{r.name}({arrays}one, out))
             softehl_lane(*lost, l) = -1;
         for (int k = 0; k < {r.outputs}; ++k) softehl_lane(s[k], l) = out[k];
     }}

@@ -82,6 +82,8 @@ class _CellPrinter(Printer):
                 return f"w[{start} + {width} * q + {k}]"
             case "parameters":
                 return f"c[{k}]"
+            case "arrays":
+                return "0.0"
         return f"rule[{self.d.rule.dimension + 1} * q + {k}]"
 
 
@@ -94,6 +96,9 @@ def function(
     p.line(1, "(void)entity_local_index, (void)quadrature_permutation, (void)custom_data;")
     if any(stage.loop is not None for stage in plan.stages):
         _table(p)
+    if definition.arrays:
+        p.line(1, "const double *const parameters = c;")
+        p.line(1, "(void)parameters;")
     fallible = bool(called([x.node for x in entries]))
     if fallible:
         p.line(1, "int failed = 0;")

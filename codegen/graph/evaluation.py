@@ -18,6 +18,7 @@ from mpmath.libmp import NoConvergence
 from softehl.codegen.graph.graph import Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.precise_arithmetic import arctangent, number
 from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton, depends
+from softehl.codegen.graph.run_time_arrays import ArrayRoutine
 from softehl.codegen.graph.traversal import Recursion, reachable, recursion
 
 Number = Any
@@ -42,7 +43,15 @@ def results(r: Routine, args: Vector, evaluate: Evaluate) -> Vector:
             x = args[r.inputs - r.function.inputs :]
             values = r.function.near(x, mpmath.mpf, r.order)
             return [mpmath.nan] * r.outputs if values is None else values
+        case ArrayRoutine():  # of any array, where none is given
+            return _of_array(r, exact(r.layout.sample(random.Random(r.name))), (), args)
     raise TypeError(f"no value for {r}")
+
+
+def _of_array(r: ArrayRoutine, array: Vector, rate: Sequence[Number], args: Vector) -> Vector:
+    h = mpmath.mpf(10) ** (-mpmath.mp.dps // 4)
+    functions = {"exp": mpmath.exp, "log": mpmath.log, "tanh": mpmath.tanh, "step": lambda _: h}
+    return r.results(array, rate, args, functions)
 
 
 def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
@@ -228,7 +237,8 @@ class State:
     """Arguments of one element: exact numbers, as doubles or mpmath values.
 
     `rule` holds rows (coordinates..., weight); `basis` [point][mode] = (value, xi-derivative)
-    of each field; `point_data` [point][entry].
+    of each field; `point_data` [point][entry]; `arrays` those of any length, `array_rates` how they
+    move along a variation.
     """
 
     coordinates: Sequence[Number]
@@ -238,6 +248,8 @@ class State:
     rule: Sequence[Sequence[Number]] = ((1,),)
     basis: Sequence[Sequence[Sequence[Number]]] = ()
     point_data: Sequence[Sequence[Number]] = ()
+    arrays: Sequence[Sequence[Number]] = ()
+    array_rates: Sequence[Sequence[Number]] = ()
 
 
 class Walk:
@@ -256,6 +268,7 @@ class Walk:
             "dofs": exact(state.dofs) if dofs is None else dofs,
             "data": exact(state.data),
             "parameters": exact(state.parameters),
+            "arrays": [mpmath.mpf(0)] * len(state.arrays),
         }
         self.memo: dict[tuple[Node, int], Number] = {}
 
@@ -298,7 +311,7 @@ class Walk:
                 operands = []
                 for a in n.args:
                     operands.append((yield self._at(a, q)))
-                return results(n.payload, operands, _local)
+                return self._results(n.payload, operands)
             case Op.ITEM:
                 assert isinstance(n.payload, ResultIndex)
                 return (yield self._at(n.args[0], q))[n.payload.index]
@@ -309,6 +322,18 @@ class Walk:
         for a in n.args:
             args.append((yield self._at(a, q)))
         return _UNARY[n.op](*args) if len(args) == 1 else _BINARY[n.op](*args)
+
+    def _results(self, r: Routine, operands: Vector) -> Vector:
+        if isinstance(r, ArrayRoutine) and self.state.arrays:
+            rate = exact(self.state.array_rates[r.array]) if self.state.array_rates else ()
+            return _of_array(r, exact(self.state.arrays[r.array]), rate, operands)
+        return results(r, operands, self._local)
+
+    def _local(self, values: Sequence[Node], local: Vector, external: Vector) -> Vector:
+        """Localised values of a routine."""
+        walk = Walk(self.state, {})
+        walk.arrays = {"local": local, "external": external}
+        return [walk.value(n) for n in values]
 
     def _input(self, source: Input, q: int) -> Number:
         if source.array == "rule":
@@ -327,13 +352,6 @@ class Walk:
 def exact(values: Sequence[Number]) -> Vector:
     """Numbers of the working precision."""
     return [mpmath.mpf(v) for v in values]
-
-
-def _local(values: Sequence[Node], local: Vector, external: Vector) -> Vector:
-    """Localised values of a routine."""
-    walk = Walk(State((), ()), {})
-    walk.arrays = {"local": local, "external": external}
-    return [walk.value(n) for n in values]
 
 
 def evaluate(root: Node, inputs: Mapping[tuple[str, int], Number], digits: int = 50) -> Number:

@@ -78,6 +78,11 @@ class Response:
         return 7 + 6 * a - a * (a - 1) // 2 + b - a
 
 
+def arrays_of(law: Law) -> tuple[str, ...]:
+    """Names of the curves and networks of a law."""
+    return tuple(a.name for a in _written(law, sp.eye(3))[0].arrays)
+
+
 def is_small_strain(law: Law) -> bool:
     """True for a law of small strains."""
     return bool(_written(law, sp.eye(3))[1].small)

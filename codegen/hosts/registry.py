@@ -47,11 +47,13 @@ StatesOf: TypeAlias = "Callable[[Definition], Sequence[State]]"
 class Host:
     """Writers of the files for an element and for a material; None where the host takes none.
 
-    They raise `TargetError` for models that the program cannot hold.
+    They raise `TargetError` for models that the program cannot hold. arrays: whether the program
+    hands over run-time arrays (`Model.table`, `Model.network`).
     """
 
     element: Callable[[ElementInterface, Sequence[State]], Files] | None = None
     material: Callable[[Law, StatesOf], Files] | None = None
+    arrays: bool = False
 
 
 def targets() -> dict[str, EntryPoint]:

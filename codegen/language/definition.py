@@ -9,6 +9,7 @@ from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.external_function import ExternalFunction
 from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.graph.routines import external_functions
+from softehl.codegen.graph.run_time_arrays import RunTimeArray
 from softehl.codegen.language.sympy_tape import SympyTape
 
 
@@ -153,6 +154,8 @@ class Definition:
         Reference cell of a weak form.
     point : PointForm or None
         The model at a point.
+    arrays : tuple of RunTimeArray
+        Arrays of any length that each call gives: curves, weights of networks.
     record : Record
         The model as it was written, by which kernels are checked.
     statements : tuple of Statement
@@ -202,6 +205,8 @@ class Definition:
     """The cell of a weak form, which could stand on another one, too."""
     point: PointForm | None = field(default=None, compare=False)
     """The same model at a point, from which the kernel of the whole element can be made as well."""
+    arrays: tuple[RunTimeArray, ...] = ()
+    """Arrays of any length, the same for all elements of a call."""
     record: SympyTape = field(default_factory=SympyTape, repr=False, compare=False)
     """The model as written, by which kernels are checked; nothing is derived from it."""
     statements: tuple[Statement, ...] = field(default=(), repr=False, compare=False)

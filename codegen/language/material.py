@@ -40,7 +40,7 @@ class Material:
         Name of the law.
     model : Model
         Model that the law is part of. Its `parameters`, `require`, `point_data`, `history`,
-        `fields`, `norm`, `derivative` and `example` are methods here as well.
+        `fields`, `norm`, `derivative`, `example`, `table` and `network` are methods here as well.
     W : Expr or None
         Energy per reference volume [MPa].
     P : Matrix or None
@@ -61,6 +61,7 @@ class Material:
         self.parameters, self.require = model.parameters, model.require
         self.point_data, self.history, self.fields = model.point_data, model.history, model.fields
         self.norm, self.derivative, self.example = model.norm, model.derivative, model.example
+        self.table, self.network = model.table, model.network
 
     @property
     def F(self) -> Any:

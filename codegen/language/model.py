@@ -14,7 +14,7 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language import external_functions, local_unknowns
+from softehl.codegen.language import external_functions, local_unknowns, run_time_functions
 from softehl.codegen.language.definition import Argument, Definition
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.flatten import CheckedList
@@ -477,6 +477,105 @@ class Model(ModelBuilder):
         address = [] if source is not None else [self._address(what)]
         prototype = external_functions.Prototype(what, outputs, derivatives, source)
         return external_functions.external_values(self._symbols, name, inputs, prototype, address)
+
+    def table(
+        self,
+        name: str,
+        argument: Any,
+        *,
+        meaning: str = "",
+        interpolation: str = "linear",
+        outside: str = "constant",
+    ) -> sp.Symbol:
+        """Return the value of a curve whose points are given with each call.
+
+        Parameters
+        ----------
+        name : str
+            Name of the curve, by which `Study.add` gets its points: k=([20, 100], [1.2, 1.1]).
+            Several calls with one name are values of one curve.
+        argument : Expr
+            Where it is evaluated.
+        meaning : str
+            Meaning of its values, with their unit.
+        interpolation : str
+            "linear", "pchip" (monotone cubic) or "spline" (C2 cubic), unless the curve says so.
+        outside : str
+            Before the first point and behind the last: "constant", "linear", or "error": not a
+            number; unless the curve says so.
+
+        Returns
+        -------
+        Symbol
+            The value. All of its derivatives are exact.
+
+        Raises
+        ------
+        ModelError
+            There is no such interpolation.
+        """
+        return run_time_functions.table(
+            self._symbols,
+            self._arguments.array,
+            name,
+            argument,
+            meaning=meaning,
+            interpolation=interpolation,
+            outside=outside,
+        )
+
+    def network(
+        self,
+        name: str,
+        inputs: Sequence[Any],
+        *,
+        layers: Sequence[int] = (16, 16),
+        activation: str = "softplus",
+        convex: bool = False,
+        monotone: bool = False,
+        meaning: str = "",
+    ) -> sp.Symbol:
+        """Return the value of a network whose weights are given with each call.
+
+        Parameters
+        ----------
+        name : str
+            Name of its weights, by which `Study.add` gets them: W=[(W1, b1), (W2, b2), (W3, b3)].
+        inputs : list of Expr
+            What it sees.
+        layers : sequence of int
+            Widths of the hidden layers.
+        activation : str
+            "softplus", "softplus_squared", "tanh" or "sigmoid", of all hidden layers.
+        convex : bool
+            True: an input-convex network. Hidden layers and the result see the inputs, too, with
+            weights of their own, and weights of hidden values must not be negative.
+        monotone : bool
+            True, of a convex one: no weight is negative, so that it increases with each input.
+        meaning : str
+            Meaning of its value, with the unit.
+
+        Returns
+        -------
+        Symbol
+            The value. Its first and second derivatives are exact.
+
+        Raises
+        ------
+        ModelError
+            A width is no integer above zero, or there is no such activation.
+        """
+        return run_time_functions.network(
+            self._symbols,
+            self._arguments.array,
+            name,
+            inputs,
+            layers=layers,
+            activation=activation,
+            convex=convex,
+            monotone=monotone,
+            meaning=meaning,
+        )
 
     def derivative(self, name: str, value: Any, by: Any) -> Any:
         """Return derivatives of a scalar, such as P = dW/dF.

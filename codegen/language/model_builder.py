@@ -21,6 +21,7 @@ from softehl.codegen.elements import cells
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.graph.differentiation import gradient
 from softehl.codegen.graph.graph import Input, Node, Op
+from softehl.codegen.graph.run_time_arrays import RunTimeArray
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language import local_unknowns
 from softehl.codegen.language.definition import Argument, Condition, Definition
@@ -57,6 +58,7 @@ class Arguments:
         self.lists: dict[str, list[Argument]] = {"parameters": [], "data": [], "point data": []}
         self.conditions: list[Condition] = []
         self.example: dict[str, float] = {}
+        self.arrays: list[RunTimeArray] = []
         self._declared: dict[str, tuple[Node, str]] = {}
         self._idle: set[str] = set()
 
@@ -136,6 +138,20 @@ class Arguments:
             self._input(name, array, start + k, varying=varying) for k, name in enumerate(meanings)
         ]
 
+    def array(self, record: RunTimeArray) -> tuple[int, sp.Symbol]:
+        """Number of a run-time array, declared once, and the amount of its variation."""
+        named = [k for k, a in enumerate(self.arrays) if a.name == record.name]
+        number = named[0] if named else len(self.arrays)
+        if named and self.arrays[number].layout != record.layout:
+            raise ModelError(
+                f"{record.name} is declared already, as {self.arrays[number].layout}: say the same "
+                f"here, not {record.layout}, or take another name"
+            )
+        if not named:
+            self.arrays.append(record)
+        amount = self._input(f"variation of {record.name}", "arrays", number)
+        return number, amount
+
     def nodal_data(
         self, names: Sequence[str], meaning: str, nodes: int | None
     ) -> list[list[sp.Symbol]]:
@@ -211,6 +227,7 @@ class Arguments:
             unknown = isinstance(n.payload, Input) and n.payload.array == "dofs"
             if n not in (equations if unknown else used):
                 what, advice = ("unknown", unused) if unknown else ("argument", "leave it out")
+                name = name.removeprefix("variation of ")
                 raise ModelError(f"the {what} {name} is never used: {advice}", where)
 
     def _input(self, name: str, array: str, index: int, *, varying: bool = False) -> sp.Symbol:
@@ -526,6 +543,11 @@ class ModelBuilder:
         self._outputs = Outputs(self._symbols)
         self._functions: dict[str, Node] = {}
 
+    @property
+    def arrays(self) -> tuple[RunTimeArray, ...]:
+        """Run-time arrays that are declared so far."""
+        return tuple(self._arguments.arrays)
+
     def _foreign(self, rule: QuadratureRule, nodes: int) -> str:
         """Words on a rule of another cell than that of the nodes."""
         return cells.foreign(rule, nodes)
@@ -577,6 +599,7 @@ class ModelBuilder:
             dof_nodes=tuple(a.dof_nodes),
             history=tuple(name for name, _ in o.history),
             internal=tuple(a.internal),
+            arrays=tuple(a.arrays),
             functions=tuple(self._functions),
             record=self._symbols.record,
             statements=tuple(self._symbols.statements),

@@ -312,6 +312,8 @@ class Symbols:
         self.bound: dict[sp.Symbol, Node] = {}
         self.lower = Lowering(self.graph, self.bound)
         self.statements: list[Statement] = []
+        self.routines: dict[Any, Any] = {}
+        """Routines of run-time arrays, and labels of their values by their arguments."""
         self._by_label: dict[str, Any] = {}
 
     def __contains__(self, label: str) -> bool:
@@ -319,7 +321,11 @@ class Symbols:
 
     def inputs(self) -> set[str]:
         """Labels of all arguments."""
-        return {str(s) for s, n in self.bound.items() if n.op is Op.INPUT}
+        return {
+            str(s)
+            for s, n in self.bound.items()
+            if isinstance(n.payload, Input) and n.payload.array != "arrays"
+        }
 
     def label_of(self, node: Node) -> str | None:
         """Label of the first symbol of a node."""

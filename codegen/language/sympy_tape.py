@@ -57,6 +57,15 @@ class External:
 
 
 @dataclass(frozen=True)
+class OfArray:
+    """Function of `args` that a run-time array defines; `amount` is that of its variation."""
+
+    layout: Any
+    amount: Any
+    args: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
 class Slope:
     """Derivative of `value` by the quantity of a symbol."""
 

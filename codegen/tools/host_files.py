@@ -10,6 +10,7 @@ from softehl.codegen.abi import TargetError
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import registry
 from softehl.codegen.hosts.element_interface import ElementInterface
+from softehl.codegen.hosts.material_response import arrays_of
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.material import Law
 from softehl.codegen.language.weak_form import DEFAULT_CELL, CellOptions
@@ -55,6 +56,13 @@ def generate(
 def files(d: Definition | Law, target: str) -> dict[str, str]:
     """Every file of a model for a host.  Raises `TargetError`, `NoStateError`."""
     writers = registry.host(target)
+    arrays = arrays_of(d) if isinstance(d, Law) else tuple(a.name for a in d.arrays)
+    if arrays and not writers.arrays:
+        allowed = [t for t in registry.targets() if registry.host(t).arrays]
+        raise TargetError(
+            f"{d.name} reads {', '.join(arrays)} at run time, which target {target} does not hand "
+            f"over; Study.add and {', '.join(allowed) or 'kernels of softehl'} do"
+        )
     if isinstance(d, Law):
         if writers.material is None:
             raise TargetError(

@@ -10,6 +10,7 @@ from typing import Any
 from softehl.codegen import abi
 from softehl.codegen.emit import c_source
 from softehl.codegen.emit.liveness import peak_live
+from softehl.codegen.graph.run_time_arrays import RunTimeArray
 from softehl.codegen.pipeline import Function, KernelSource
 
 
@@ -73,6 +74,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         **({"internal": list(d.internal)} if d.internal else {}),
         **({"functions": list(d.functions)} if d.functions else {}),
         **({"cell": d.cell} if d.cell else {}),
+        **({"arrays": {a.name: _array(a) for a in d.arrays}} if d.arrays else {}),
         **({"kept": kernel.cached} if kernel.cached else {}),
         "conditions": [[c.name, c.relation, c.bound, c.where] for c in d.conditions],
         "fields": [name for name, _ in d.fields],
@@ -83,6 +85,10 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "design_bytes": len(kernel.design.encode()),
         "signature": hashlib.sha256((kernel.text + kernel.design).encode()).hexdigest()[:16],
     }
+
+
+def _array(a: RunTimeArray) -> dict[str, Any]:
+    return {"meaning": a.meaning, "kind": a.layout.kind, **a.layout.options}
 
 
 def _cost(f: Function, points: int) -> dict[str, int]:

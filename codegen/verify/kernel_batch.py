@@ -31,7 +31,7 @@ class Batch:
             _doubles(v for s in states for v in s.coordinates),
             _doubles(v for s in states for v in s.dofs),
             _doubles(v for s in states for row in (s.data, *s.point_data) for v in row),
-            _doubles(first.parameters),
+            _doubles(()),
             _doubles(()),
             _doubles(v for row in first.rule for v in row),
             _doubles(flat),
@@ -57,6 +57,7 @@ class Batch:
         function = getattr(self.library, abi.function_name(self.d.name, task))
         function.restype = None
         sizes = (ctypes.c_ssize_t(v) for v in (n, self.points, self.modes))
+        self.arrays[3] = _doubles(parameters_of(self.states[0], rates=task in abi.DESIGN))
         self.arrays[4] = _doubles(v for e in range(n) for v in self.direction(task, e))
         arguments = (*sizes, *self.arrays, values, tangent)
         return (wide, values), (square, tangent), lambda: function(*arguments)
@@ -81,6 +82,19 @@ class Batch:
             return False
         values = self.call(task)[0]
         return any(all(map(math.isnan, v)) for v in (values[:1] if first else values))
+
+
+def parameters_of(state: State, *, rates: bool = False) -> list[float]:
+    """Parameters of a call with its run-time arrays, as `codegen.abi` has them."""
+    at = len(state.parameters) + abi.ARRAY_ENTRIES * len(state.arrays)
+    entries: list[float] = []
+    values: list[float] = []
+    moving = state.array_rates if rates else [()] * len(state.arrays)
+    for array, rate in zip(state.arrays, moving, strict=True):
+        place = at + len(values)
+        entries += [place, len(array), place + len(array) if len(rate) else 0]
+        values += [float(v) for v in (*array, *rate)]
+    return [*map(float, state.parameters), *entries, *values]
 
 
 def _doubles(values: Iterable[Any]) -> Any:

@@ -69,7 +69,12 @@ def admissible_states(definition: Definition, count: int) -> list[State]:
     for attempt in range(ATTEMPTS + count):
         state = draw(definition, rng, attempt)
         if states:  # the states of a call share its parameters
-            state = replace(state, parameters=states[0].parameters)
+            state = replace(
+                state,
+                parameters=states[0].parameters,
+                arrays=states[0].arrays,
+                array_rates=states[0].array_rates,
+            )
         if evaluator.at(state).real():
             states.append(state)
         if len(states) == count:
@@ -111,6 +116,7 @@ def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
     unknowns = [*d.unknowns, *(name for name in _fields(d) for _ in range(2))]
     dofs = [vary(example[n]) if n in example else deviation * rng.uniform(-1, 1) for n in unknowns]
     rule = _rule(d)
+    arrays = [a.layout.sample(rng) for a in d.arrays]
     return State(
         coordinates=_coordinates(d, rng, deviation),
         dofs=dofs,
@@ -119,6 +125,8 @@ def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
         rule=rule,
         basis=[_linear(float(p[0]), len(_fields(d))) for p in rule] if d.interpolated else (),
         point_data=[[about_one(a.name) for a in d.point_data] for _ in rule],
+        arrays=arrays,
+        array_rates=[a.layout.rate(rng, v) for a, v in zip(d.arrays, arrays, strict=True)],
     )
 
 

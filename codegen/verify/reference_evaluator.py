@@ -128,6 +128,10 @@ def _function(s: Step, n: Exact) -> Function | None:
     return n.settled(s.slot, n.functions[s.name]) if s.name in n.functions else None
 
 
+def _of_array(layout: Any, n: Exact) -> Function:
+    return lambda array, args: layout.value(array, args, n.functions)
+
+
 def _fixed_power(n: Exact, e: Any) -> Function:
     top, bottom = e.numerator, e.denominator
     if bottom == 1:
@@ -171,7 +175,12 @@ class Evaluation:
             "dofs": [n.number(v) for v in state.dofs],
             "data": [n.number(v) for v in state.data],
             "parameters": [n.number(v) for v in state.parameters],
+            "arrays": [n.number(0)] * len(state.arrays),
         }
+        self.moving = [
+            [(n.number(v), n.number(w)) for v, w in zip(a, b, strict=True)]
+            for a, b in zip(state.arrays, state.array_rates, strict=True)
+        ]
         self.solved: dict[tuple[int, int], tuple[Vector, list[Vector]]] = {}
         self.frozen: frozenset[int] = frozenset()
 
@@ -214,6 +223,11 @@ class Evaluation:
                 return self._solve(s, row, q)
             case "slope":
                 return self._slope(s, q)
+            case "of array":
+                layout, number = s.content
+                amount, *args = (row[a] for a in s.args)
+                array = [v + amount * w if amount else v for v, w in self.moving[number]]
+                return n.settled(s.slot, _of_array(layout, n))(array, args)
             case "external":
                 return s.content.near([row[a] for a in s.args], n.number)
             case "stretches":
@@ -342,7 +356,7 @@ class Evaluation:
     ) -> Evaluation:
         """Values of `roots` for changed arrays; `frozen` quantities keep their values."""
         made = Evaluation.__new__(Evaluation)
-        made.evaluator, made.state = self.evaluator, self.state
+        made.evaluator, made.state, made.moving = self.evaluator, self.state, self.moving
         made.rows = [list(row) for row in self.rows]
         made.solved, made.frozen = dict(self.solved), frozenset(frozen)
         made.arrays = {
@@ -464,6 +478,8 @@ class ReferenceTasks:
             if numbers[:size]:
                 moves[array] = numbers[:size]
             numbers = numbers[size:]
+        if self.state.arrays:
+            moves["arrays"] = self._numbers([1.0] * len(self.state.arrays))
         return moves
 
     def _fields(self, at: Evaluation) -> list[Vector]:

@@ -22,12 +22,13 @@ from softehl.codegen.language.sympy_tape import (
     Implicit,
     Integral,
     Local,
+    OfArray,
     Principal,
     Slope,
     SympyTape,
 )
 
-ARRAYS = ("coordinates", "dofs", "data", "parameters")
+ARRAYS = ("coordinates", "dofs", "data", "parameters", "arrays")
 """Arrays of arguments that are the same for all points."""
 
 
@@ -159,6 +160,8 @@ class _Builder:
                 parts = (*meaning.unknowns, *meaning.equations, *meaning.start)
             case Principal():
                 parts = (*meaning.squares, meaning.energy, *meaning.entries)
+            case OfArray():
+                parts = (meaning.amount, *meaning.args)
             case External():
                 parts = meaning.inputs
             case Slope():
@@ -208,6 +211,9 @@ class _Builder:
                 return self._add(
                     "stretches", self._at(*m.entries), (squares, energy[0]), inner=inner
                 )
+            case OfArray():
+                number = self.record.inputs[m.amount][1]
+                return self._add("of array", self._at(m.amount, *m.args), (m.layout, number))
             case External():
                 key = ("external", m.function, m.inputs)
                 if key not in self._slots:

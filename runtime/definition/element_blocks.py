@@ -20,8 +20,10 @@ from softehl.runtime.definition.problem_definition import (
     StudyError,
 )
 from softehl.runtime.discretisation.dofmap import Slot, slots
+from softehl.runtime.kernels.array_data import data_of
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.kernels.kernel_call import ArgumentError, Rule, address_of
+from softehl.runtime.kernels.run_time_arrays import ArrayData, ArrayDataError, RunTimeArray
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.interior_facets import cells_at_side, interior
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
@@ -152,6 +154,7 @@ def page_on(
     filled = {**previous, **rates, **accelerations}
     needed = [p for p in kernel.parameters if p not in automatic]
     needed += [d for d in kernel.data if d not in filled]
+    needed += [a.name for a in kernel.arrays]
     missing = [a for a in needed if a not in arguments]
     for common_name, labels in at_nodes.items():
         if set(labels) <= set(missing):
@@ -181,7 +184,16 @@ def page_on(
             for p in kernel.parameters
             if p in arguments
         },
+        arrays={a.name: _array_data(name, a, arguments[a.name]) for a in kernel.arrays},
     )
+
+
+def _array_data(block: str, array: RunTimeArray, given: object) -> ArrayData:
+    """Points of a curve or weights of a network.  Raises StudyError."""
+    try:
+        return data_of(array, given)
+    except ArrayDataError as error:
+        raise StudyError(f"{block!r}: {array.name}: {error}") from None
 
 
 def parameter_of(kernel: Kernel, block: str, name: str, value: Any) -> Number:
@@ -209,7 +221,8 @@ def _require_fit(mesh: Mesh, kernel: Kernel) -> None:
 
 
 def _arguments(kernel: Kernel) -> list[str]:
-    return [*kernel.parameters, *kernel.data, *kernel.point_data]
+    arrays = [a.name for a in kernel.arrays]
+    return [*kernel.parameters, *kernel.data, *kernel.point_data, *arrays]
 
 
 def _nodal_data(kernel: Kernel) -> dict[str, list[str]]:

@@ -14,6 +14,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.dofmap import Slot
 from softehl.runtime.discretisation.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.kernels.kernel import Kernel, Rule
+from softehl.runtime.kernels.run_time_arrays import ArrayData
 from softehl.runtime.mesh.mesh import Mesh, Predicate
 
 Where: TypeAlias = "str | Predicate | Integers | Sequence[float]"
@@ -59,6 +60,7 @@ class Block:
     previous: column of the kernel's data -> name and node of the unknown whose value at the step
     before it is; rates, accelerations: likewise of what `rates` adds. initial: (n, points, k) point
     data at the start, or None.
+    arrays: curves and weights of networks by name.
     differentiated: makes the kernel of derivatives, or None where the page is C.
     """
 
@@ -74,6 +76,7 @@ class Block:
     accelerations: Mapping[str, Slot]
     initial: Array | None
     parameters: Mapping[str, Number]
+    arrays: Mapping[str, ArrayData] = field(default_factory=dict)
     differentiated: Callable[[], Kernel] | None = None
 
     @property

@@ -21,6 +21,7 @@ from softehl.runtime.discretisation.problem_checks import (
     not_finite,
     require_sound_elements,
     rows_not_finite,
+    table_ends,
 )
 from softehl.runtime.discretisation.sparsity import Pattern, Structure
 from softehl.runtime.suggestions import short_list
@@ -332,7 +333,8 @@ class Assembler:
                 message = not_finite(block, results)
                 if message:
                     row = int(rows_not_finite(results)[0])
-                    return message + fault_message(block, x, parameters[block.name], row)
+                    ends = table_ends(block, x, parameters[block.name])
+                    return message + (ends or fault_message(block, x, parameters[block.name], row))
         return ""
 
     def linearise(

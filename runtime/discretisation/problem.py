@@ -569,7 +569,11 @@ class Problem:
             if set(values) != set(names):
                 raise ProblemError(f"block {name!r} is off: give all of {join_names(names)}")
             return in_order(block, values)
-        return in_order(block, {**dict(zip(names, old, strict=True)), **values})
+        changed = {**dict(zip(names, old, strict=False)), **values}
+        arrays = old[len(names) :]
+        if not len(arrays):
+            return in_order(block, changed)
+        return np.concatenate([[changed[name] for name in names], arrays])
 
     def eliminated(self, K: csc_array[np.float64]) -> csc_array[np.float64]:
         """Return K with rows and columns of prescribed unknowns replaced by those of the identity.

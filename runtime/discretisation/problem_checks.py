@@ -10,6 +10,8 @@ import numpy as np
 from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.kernels.kernel import Kernel
+from softehl.runtime.kernels.run_time_arrays import is_packed, unpacked
+from softehl.runtime.kernels.tables import points_of, with_ends
 from softehl.runtime.mesh.cells import CELLS, Cell, jacobians
 from softehl.runtime.suggestions import did_you_mean, join_names
 
@@ -36,6 +38,9 @@ def require_known(what: str, names: Iterable[str], allowed: Iterable[str]) -> No
 def in_order(block: ElementBlock, parameters: Any) -> Array:
     """Parameters of a block, an array or a mapping by name, in the order of its kernel."""
     names = block.kernel.parameters
+    arrays = getattr(block.kernel, "arrays", ())
+    if arrays:
+        return _with_arrays(block, parameters)
     if isinstance(parameters, Mapping):
         require_known(f"parameter of block {block.name!r}", parameters, names)
         missing = [name for name in names if name not in parameters]
@@ -52,6 +57,26 @@ def in_order(block: ElementBlock, parameters: Any) -> Array:
     if not np.isfinite(values).all():
         k = int(np.flatnonzero(~np.isfinite(values))[0])
         raise ProblemError(f"block {block.name!r}: {names[k]} = {values[k]}, must be finite")
+    return values
+
+
+def _with_arrays(block: ElementBlock, parameters: Any) -> Array:
+    """Parameters of a block that has curves or networks, with these behind them."""
+    kernel = block.kernel
+    assert isinstance(kernel, Kernel)
+    names = [*kernel.parameters, *(a.name for a in kernel.arrays)]
+    if isinstance(parameters, Mapping):
+        require_known(f"parameter of block {block.name!r}", parameters, names)
+        missing = [name for name in names if name not in parameters]
+        if missing:
+            raise ProblemError(f"block {block.name!r} needs {', '.join(missing)} too")
+        return kernel.with_arrays([parameters[name] for name in kernel.parameters], parameters)
+    values = np.asarray(parameters, dtype=np.float64)
+    if not is_packed(values, len(kernel.parameters), len(kernel.arrays)):
+        raise ProblemError(
+            f"block {block.name!r} has curves or networks: give its parameters by name "
+            f"({join_names(names)})"
+        )
     return values
 
 
@@ -147,6 +172,34 @@ def fault_message(block: ElementBlock, x: Array, parameters: Array, row: int) ->
     except (SoftehlError, ImportError):
         return ""  # no page, or no SymPy
     return f": {fault}" if fault else ""
+
+
+def table_ends(block: ElementBlock, x: Array, parameters: Array) -> str:
+    """Curves that end where an element needs a value of them, in words; empty if there are none.
+
+    They are those whose continuation makes more elements finite.
+    """
+    kernel = block.kernel
+    names = [a.name for a in getattr(kernel, "arrays", ()) if a.kind == "table"]
+    if not names:
+        return ""
+    assert isinstance(kernel, Kernel)
+    before = len(rows_not_finite(block.tangent(x, parameters)))
+    continued = parameters.copy()
+    arrays = unpacked(continued, len(kernel.parameters), len(kernel.arrays))
+    found = []
+    for array, values in zip(kernel.arrays, arrays, strict=True):
+        if array.kind == "table" and np.isnan(values).any():
+            knots, saved = points_of(values), values.copy()
+            values[:] = with_ends(values)
+            after = len(rows_not_finite(block.tangent(x, continued)))
+            if after < before:
+                bounds = f"{knots[0]:g} to {knots[-1]:g}"
+                found.append(f"the curve {array.name!r} ends there: its points go from {bounds}")
+                before = after
+            else:
+                values[:] = saved
+    return "".join(f"; {text}" for text in found)
 
 
 def rows_not_finite(results: Sequence[Array]) -> Integers:

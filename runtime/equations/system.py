@@ -23,6 +23,7 @@ from softehl.runtime.discretisation.communicator import SERIAL, Communicator
 from softehl.runtime.discretisation.dofmap import Numbering
 from softehl.runtime.discretisation.loads import Tie, amount
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.kernels.run_time_arrays import packed
 from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.suggestions import short_list
 
@@ -272,7 +273,10 @@ class System:
                     history = step.histories.get(page.name)
                     assembler = assembler.with_data(page.name, **state, point_data=history)
             numbers = [parameter_values[name] for name in block.kernel.parameters]
-            parameters[block.name] = np.array([v(step.t) if callable(v) else v for v in numbers])
+            array = np.array([v(step.t) if callable(v) else v for v in numbers])
+            if page is not None and page.arrays:
+                array = packed(array, [a.numbers for a in page.arrays.values()])
+            parameters[block.name] = array
         layout = self.numbering.layout
         posed_on: dict[str, Any] = {"fixed": fixed, "values": values}
         if self.contacts:

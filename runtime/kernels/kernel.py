@@ -17,6 +17,7 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.explanation import ElementState, Explanation, explanation
 from softehl.runtime.kernels.kernel_call import ArgumentError, Call, CallArguments, Family, Rule
+from softehl.runtime.kernels.run_time_arrays import RunTimeArray
 from softehl.runtime.kernels.shared_library import (
     GENERATED,
     KernelError,
@@ -46,8 +47,8 @@ class Kernel(Family):
     """Compiled kernel of one kind of element; arrays hold n elements.
 
     Calls take by name what the kernel needs besides coordinates and unknowns: `data` (n, k),
-    `point_data` (n, points, k), `parameters` (k,) and `rule`. A kernel is pickled by its name and
-    the folder of its library.
+    `point_data` (n, points, k), `parameters` (k,) or by name, and `rule`. Curves and weights of
+    networks are parameters by name. A kernel is pickled by its name and the folder of its library.
     """
 
     def __repr__(self) -> str:
@@ -429,7 +430,14 @@ def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
         functions=tuple(entry.get("functions", ())),
         cell=entry.get("cell", ""),
         kept=entry.get("kept", 0),
+        arrays=tuple(_array(n, a) for n, a in entry.get("arrays", {}).items()),
     )
+
+
+def _array(name: str, entry: Mapping[str, Any]) -> RunTimeArray:
+    """The run-time array that an entry of a manifest describes."""
+    options = {key: value for key, value in entry.items() if key not in ("meaning", "kind")}
+    return RunTimeArray(name, entry["kind"], options)
 
 
 def kernel_in(directory: Path, name: str | None = None, cell: str | None = None) -> Kernel:

@@ -6,7 +6,7 @@ The shapes, orders and units of every array are those of `codegen/abi.py`.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,6 +15,13 @@ import cffi
 import numpy as np
 
 from softehl.runtime.arrays import Array, frozen
+from softehl.runtime.kernels.array_data import data_of
+from softehl.runtime.kernels.run_time_arrays import (
+    ArrayDataError,
+    RunTimeArray,
+    is_packed,
+    packed,
+)
 from softehl.runtime.kernels.shared_library import KernelError, Library
 
 
@@ -137,6 +144,20 @@ class Family:
     functions: tuple[str, ...] = ()
     cell: str = ""
     kept: int = 0
+    arrays: tuple[RunTimeArray, ...] = ()
+
+    def with_arrays(self, parameters: Sequence[float] | Array, given: Mapping[str, Any]) -> Array:
+        """Parameters as C reads them: numbers, then the arrays that `given` has by name.
+
+        Raises ArgumentError.
+        """
+        parts = []
+        for array in self.arrays:
+            try:
+                parts.append(data_of(array, given[array.name]).numbers)
+            except ArrayDataError as error:
+                raise ArgumentError(f"{self.name}: {array.name}: {error}") from None
+        return packed(parameters, parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,9 +233,7 @@ class Call:
         kernel, n, points = self.kernel, self.n, len(self.rule.weights)
         data = np.empty((n, 0)) if arguments.data is None else arguments.data
         data = self._array("data", data, (n, len(kernel.data)))
-        parameters = self._array(
-            "parameters", self._ordered(arguments.parameters), (len(kernel.parameters),)
-        )
+        parameters = self._parameters(arguments.parameters)
         for condition in kernel.conditions:
             self._check(data, parameters, condition)
         if kernel.point_data or arguments.point_data is not None:
@@ -265,17 +284,29 @@ class Call:
             )
         return int(shape[1])
 
-    def _ordered(self, parameters: Any) -> Any:
-        if not isinstance(parameters, Mapping):
-            return parameters
-        missing = [p for p in self.kernel.parameters if p not in parameters]
+    def _parameters(self, given: Any) -> Array:
+        """Parameters in order, with the arrays behind them."""
+        kernel, count = self.kernel, len(self.kernel.parameters)
+        if not isinstance(given, Mapping):
+            if not kernel.arrays:
+                return self._array("parameters", given, (count,))
+            if not isinstance(given, np.ndarray) or not is_packed(given, count, len(kernel.arrays)):
+                names = [*kernel.parameters, *(a.name for a in kernel.arrays)]
+                raise ArgumentError(
+                    f"{kernel.name} has curves or networks: give its parameters by name, "
+                    f"parameters=dict({', '.join(f'{n}=...' for n in names)})"
+                )
+            return np.ascontiguousarray(given, dtype=np.float64)
+        needed = [*kernel.parameters, *(a.name for a in kernel.arrays)]
+        missing = [p for p in needed if p not in given]
         if missing:
-            raise ArgumentError(f"{self.kernel.name} needs {', '.join(missing)}")
-        functions = self.kernel.functions
-        return [
-            address_of(p, parameters[p]) if p in functions else parameters[p]
-            for p in self.kernel.parameters
+            raise ArgumentError(f"{kernel.name} needs {', '.join(missing)}")
+        ordered = [
+            address_of(p, given[p]) if p in kernel.functions else given[p]
+            for p in kernel.parameters
         ]
+        numbers = self._array("parameters", ordered, (count,))
+        return kernel.with_arrays(numbers, given) if kernel.arrays else numbers
 
     def _array(self, what: str, value: Any, shape: tuple[int, ...]) -> Array:
         if isinstance(value, np.ma.MaskedArray):

@@ -16,6 +16,7 @@ from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.discretisation.problem_checks import (
     element_name,
     rows_not_finite,
+    table_ends,
     unknown_name,
 )
 from softehl.runtime.discretisation.residual_norm import (
@@ -230,6 +231,7 @@ class DistributedProblem:
             if len(rows) and not message and block.name in part.elements:
                 global_block = part.system.everywhere.assembler.block(block.name)
                 message = element_name(global_block, int(part.elements[block.name][rows[0]]))
+                message += table_ends(block, x, self.parameters[block.name])
         return _first(message)
 
     @cached_property

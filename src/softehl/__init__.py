@@ -76,7 +76,10 @@ if TYPE_CHECKING:
     from softehl.runtime.kernels.explanation import ElementState, Explanation
     from softehl.runtime.kernels.kernel import Kernel
     from softehl.runtime.kernels.kernel_call import ArgumentError
+    from softehl.runtime.kernels.networks import initial_weights, network_layers
+    from softehl.runtime.kernels.run_time_arrays import ArrayDataError
     from softehl.runtime.kernels.shared_library import KernelError
+    from softehl.runtime.kernels.tables import Table
     from softehl.runtime.mesh.mesh import Mesh, MeshError
     from softehl.runtime.mpi import MissingPetsc
     from softehl.runtime.parallel.matrix_free import MatrixFree
@@ -108,6 +111,7 @@ if not (Path(__file__).parent / "runtime").is_dir():
 _PUBLIC = {
     "Arclength": "softehl.runtime.solve.arclength",
     "ArgumentError": "softehl.runtime.kernels.kernel_call",
+    "ArrayDataError": "softehl.runtime.kernels.run_time_arrays",
     "Assembler": "softehl.runtime.discretisation.assembly",
     "BDF2": "softehl.runtime.analyses.time_integrators",
     "BadInput": "softehl.cases.harness.errors",
@@ -172,9 +176,12 @@ _PUBLIC = {
     "Study": "softehl.runtime.study",
     "StudyError": "softehl.runtime.definition.problem_definition",
     "System": "softehl.runtime.equations.system",
+    "Table": "softehl.runtime.kernels.tables",
     "UnstableState": "softehl.runtime.equations.stability",
+    "initial_weights": "softehl.runtime.kernels.networks",
     "main": "softehl.__main__",
     "principal_values": "softehl.runtime.results.tensors",
+    "network_layers": "softehl.runtime.kernels.networks",
     "processes": "softehl.cases.harness.process_pool",
     "run_oring": "softehl.cases.oring",
     "solve_cases": "softehl.cases.shipped",
@@ -210,6 +217,7 @@ __all__ = [
     "BDF2",
     "Arclength",
     "ArgumentError",
+    "ArrayDataError",
     "Assembler",
     "BadInput",
     "Bifurcation",
@@ -290,14 +298,17 @@ __all__ = [
     "StudyError",
     "SymPyNeededError",
     "System",
+    "Table",
     "TargetError",
     "UnknownNameError",
     "UnstableState",
     "element",
+    "initial_weights",
     "kinematics",
     "load_kernel",
     "main",
     "material",
+    "network_layers",
     "page",
     "principal_values",
     "processes",
