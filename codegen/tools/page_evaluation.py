@@ -35,6 +35,7 @@ def evaluate(
             rule=state.rule.tolist(),
             basis=state.basis.tolist(),
             point_data=state.point_data.tolist(),
+            arrays=[a.tolist() for a in state.arrays],
         ),
     )
     return [(v.name, v.values, v.where) for v in explained.values], explained.fault

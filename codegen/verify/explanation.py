@@ -18,6 +18,7 @@ from softehl.codegen.graph.differentiation import gradient
 from softehl.codegen.graph.evaluation import State, Walk
 from softehl.codegen.graph.graph import BOOLEAN, Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.routines import Newton
+from softehl.codegen.graph.run_time_arrays import ArrayRoutine
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 
@@ -166,10 +167,16 @@ class _Evaluation:
             if s.name:
                 names.setdefault(s.value, s.name)
         point = f" at point {q}" if n.varying and len(self.points) > 1 else ""
+        if n.op is Op.ITEM and isinstance(n.args[0].payload, ArrayRoutine):
+            operands = n.args[0].args[:-1]
+            args = [f"{_text(a, names, DEPTH)} = {_double(self.value(a, q)):.6g}" for a in operands]
+            array = self.d.arrays[n.args[0].payload.array].name
+            at = ", ".join(args)
+            return f"{array} has no value{point}, {at}{self._line(n)}"
         if n.op is Op.ITEM and isinstance(n.args[0].payload, Routine):
             return f"{n.args[0].payload.name} has no solution{point}{self._line(n)}"
-        operands = {_text(a, names, 1): self.value(a, q) for a in n.args if a.op is not Op.CONST}
-        values = ", ".join(f"{k} = {_double(v):.6g}" for k, v in operands.items())
+        shown = {_text(a, names, 1): self.value(a, q) for a in n.args if a.op is not Op.CONST}
+        values = ", ".join(f"{k} = {_double(v):.6g}" for k, v in shown.items())
         text = _text(n, names, DEPTH)
         return f"{text} has no value{point}{', ' if values else ''}{values}{self._line(n)}"
 
@@ -195,7 +202,9 @@ def _derivatives(d: Definition) -> tuple[list[Node], list[Node]]:
     return residual, [second[u] for u in d.directions]
 
 
-_ARRAYS = {"coordinates", "dofs", "data", "parameters", "rule", "point data", "interpolated"}
+_ARRAYS = {"coordinates", "dofs", "data", "parameters", "rule", "point data", "interpolated"} | {
+    "arrays"
+}
 
 
 def _labels(d: Definition) -> dict[Node, str]:

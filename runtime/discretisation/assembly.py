@@ -333,8 +333,8 @@ class Assembler:
                 message = not_finite(block, results)
                 if message:
                     row = int(rows_not_finite(results)[0])
-                    ends = table_ends(block, x, parameters[block.name])
-                    return message + (ends or fault_message(block, x, parameters[block.name], row))
+                    message += table_ends(block, x, parameters[block.name])
+                    return message + fault_message(block, x, parameters[block.name], row)
         return ""
 
     def linearise(

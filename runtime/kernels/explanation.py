@@ -67,7 +67,10 @@ def _numbers(values: Array) -> str:
 
 @dataclass(frozen=True, eq=False)
 class ElementState:
-    """Arguments of one element: arrays in the kernel's order, points with their weights."""
+    """Arguments of one element: arrays in the kernel's order, points with their weights.
+
+    arrays: of any length, such as curves.
+    """
 
     coordinates: Array
     dofs: Array
@@ -76,6 +79,7 @@ class ElementState:
     point_data: Array
     rule: Array
     basis: Array
+    arrays: tuple[Array, ...] = ()
 
 
 def explanation(folder: Path, kernel: str, state: ElementState) -> Explanation:

@@ -17,7 +17,7 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.explanation import ElementState, Explanation, explanation
 from softehl.runtime.kernels.kernel_call import ArgumentError, Call, CallArguments, Family, Rule
-from softehl.runtime.kernels.run_time_arrays import RunTimeArray
+from softehl.runtime.kernels.run_time_arrays import RunTimeArray, unpacked
 from softehl.runtime.kernels.shared_library import (
     GENERATED,
     KernelError,
@@ -359,10 +359,11 @@ class Kernel(Family):
             coordinates=call.read[0].ravel(),
             dofs=call.read[1].ravel(),
             data=data[:columns],
-            parameters=call.read[3],
+            parameters=call.read[3][: len(self.parameters)],
             point_data=data[columns:].reshape(points, -1),
             rule=call.rule.table,
             basis=call.rule.shape_functions,
+            arrays=tuple(unpacked(call.read[3], len(self.parameters), len(self.arrays))),
         )
         return explanation(self.library.directory, self.name, state)
 
