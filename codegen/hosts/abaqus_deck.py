@@ -14,11 +14,11 @@ SCALAR = 11
 """First degree of freedom of names that are no displacements: Abaqus calls it temperature."""
 
 
-def degrees(interface: ElementInterface) -> list[int]:
-    """Degree of freedom of each name: 1, 2, 3 of the displacements, 11, 12, ... of others."""
+def degrees(interface: ElementInterface, scalar: int = SCALAR) -> list[int]:
+    """Degree of freedom of each name: 1, 2, 3 of the displacements, scalar, ... of others."""
     others = [k for k in range(len(interface.nodal)) if k not in interface.vector]
     number = {k: 1 + n for n, k in enumerate(interface.vector)}
-    number |= {k: SCALAR + n for n, k in enumerate(others)}
+    number |= {k: scalar + n for n, k in enumerate(others)}
     return [number[k] for k in range(len(interface.nodal))]
 
 

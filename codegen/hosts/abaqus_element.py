@@ -12,9 +12,9 @@ from softehl.codegen.hosts.element_common import (
     arguments,
     conditions,
     history,
+    notes,
     outputs,
     require,
-    required,
 )
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.test_states import samples
@@ -44,27 +44,12 @@ def uel(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
 
 
 def _substitutions(interface: ElementInterface) -> dict[str, object]:
-    d, numbers = interface.definition, degrees(interface)
-    rows = [f"| {k + 1} | {a.name}: {a.meaning} |" for k, a in enumerate(interface.inputs)]
-    names = [f"`{f.name}` is {n}" for f, n in zip(interface.nodal, numbers, strict=True)]
-    state = [a.name for a in interface.state]
     return {
-        "name": interface.name,
-        "NAME": interface.name.upper(),
-        "given": len(interface.inputs),
+        **notes(interface, degrees(interface), "`UNSYMM` in the deck"),
         "order": ", ".join(map(str, interface.by_node())),
         "arguments": "".join(arguments(interface)),
         "conditions": "".join(conditions(interface, "*jelem")),
-        "required": required(interface),
-        "outputs": "".join(outputs(interface, "*nsvars >= STATE + OUTPUT")),
+        "outputs": "".join(outputs(interface, "*nsvars >= STATE + OUTPUT", energy=True)),
         "history": "".join(history(interface, "svars")),
-        "properties": "\n".join(rows) or "| | none |",
-        "degrees": ", ".join(names),
-        "state": ", ".join(state) or "none",
-        "fields": ", ".join(name for name, _ in d.fields) or "none",
-        "points": interface.points,
-        "needed": interface.points * len(state),
         "variables": interface.variables,
-        "coordinates": ", ".join(d.coordinates),
-        "symmetry": "symmetric" if interface.symmetric else "not symmetric (`UNSYMM` in the deck)",
     }

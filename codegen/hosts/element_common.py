@@ -6,7 +6,7 @@ make the arguments of the model's functions of them. The languages differ in the
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from softehl.codegen.abi import TargetError, Task
@@ -118,18 +118,38 @@ def conditions(interface: ElementInterface, element: str) -> Iterable[str]:
         )
 
 
-def required(interface: ElementInterface) -> str:
-    """Conditions of a model in words."""
-    rows = interface.definition.conditions
-    return "; ".join(f"{c.name} {c.relation} {c.bound:g}" for c in rows) or "none"
+def notes(
+    interface: ElementInterface, degrees: Sequence[int], unsymmetric: str
+) -> dict[str, object]:
+    """Values for the notes of a host; unsymmetric: remark for a tangent that is not symmetric."""
+    d = interface.definition
+    rows = [f"| {k + 1} | {a.name}: {a.meaning} |" for k, a in enumerate(interface.inputs)]
+    names = [f"`{f.name}` is {n}" for f, n in zip(interface.nodal, degrees, strict=True)]
+    state = [a.name for a in interface.state]
+    return {
+        "name": interface.name,
+        "NAME": interface.name.upper(),
+        "given": len(interface.inputs),
+        "required": "; ".join(f"{c.name} {c.relation} {c.bound:g}" for c in d.conditions) or "none",
+        "properties": "\n".join(rows) or "| | none |",
+        "degrees": ", ".join(names),
+        "state": ", ".join(state) or "none",
+        "fields": ", ".join(name for name, _ in d.fields) or "none",
+        "points": interface.points,
+        "needed": interface.points * len(state),
+        "coordinates": ", ".join(d.coordinates),
+        "symmetry": "symmetric" if interface.symmetric else f"not symmetric ({unsymmetric})",
+    }
 
 
-def outputs(interface: ElementInterface, stored: str) -> Iterable[str]:
+def outputs(
+    interface: ElementInterface, stored: str = "", *, energy: bool = False
+) -> Iterable[str]:
     """Lines of C that compute fields and energy; stored: C condition that fields have a place."""
     if Task.FIELDS in interface.tasks:
-        needed = "" if interface.remembers else f"if ({stored})\n        "
+        needed = "" if interface.remembers or not stored else f"if ({stored})\n        "
         yield f"    {needed}{interface.name}_fields(1, X, u, data, p, fields);\n"
-    if Task.ENERGY in interface.tasks:
+    if energy and Task.ENERGY in interface.tasks:
         yield f"    {interface.name}_energy(1, X, u, data, p, stored);\n"
 
 

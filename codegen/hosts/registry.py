@@ -29,6 +29,7 @@ BUILT_IN = {
     "cpp": "softehl.codegen.hosts.c_library:CPP",
     "fortran": "softehl.codegen.hosts.fortran:FORTRAN",
     "matlab": "softehl.codegen.hosts.matlab:MATLAB",
+    "feap": "softehl.codegen.hosts.feap:FEAP",
     "abaqus": "softehl.codegen.hosts.abaqus_material:ABAQUS",
     "calculix": "softehl.codegen.hosts.calculix:CALCULIX",
     "jax": "softehl.codegen.hosts.jax:JAX",

@@ -97,6 +97,6 @@ def write(folder: Path, texts: Mapping[str, str]) -> None:
             f"{folder} holds {', '.join(foreign[:3])}, which softehl did not write; give another "
             "--out"
         )
-    folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         cache_store.write(folder / name, text.encode(), mode=0o644)
