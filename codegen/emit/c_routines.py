@@ -13,11 +13,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Sequence
 
-from softehl.codegen.emit import array_routines
+from softehl.codegen.emit import array_routines, tensor_routines
 from softehl.codegen.emit.c_printer import Printer, number
 from softehl.codegen.emit.code_motion import schedule
 from softehl.codegen.external_function import LOWEST_ADDRESS
-from softehl.codegen.graph.divided_difference import Quotient
+from softehl.codegen.graph.divided_difference import Quotient, SecondQuotient
 from softehl.codegen.graph.graph import Graph, Node, Op, Routine
 from softehl.codegen.graph.routines import (
     External,
@@ -27,6 +27,7 @@ from softehl.codegen.graph.routines import (
     derivatives_of_energy,
 )
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine
+from softehl.codegen.graph.tensor_functions import Kernel
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
@@ -171,6 +172,10 @@ def _text(d: Definition, r: Routine) -> list[str]:
             return array_routines.single(d, r, _signature(d, r))
         case External():
             return _external(d, r)
+        case SecondQuotient():
+            return [tensor_routines.second_quotient(r, _signature(d, r), arrays_unused(d))]
+        case Kernel():
+            return tensor_routines.text(r, _signature(d, r), arrays_unused(d))
     raise TypeError(f"no C for {r}")
 
 

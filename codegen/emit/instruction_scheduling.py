@@ -266,7 +266,36 @@ def order_plan(g: Graph, plan: Schedule, roots: Sequence[Node]) -> Schedule:
             loop = replace(loop, body=work.block(loop.body, set(computed)))
             computed.update(loop.sums)
         stages.append(replace(stage, preamble=preamble, loop=loop))
+    live = set(roots)
+    for k, stage in reversed(list(enumerate(stages))):
+        loop = stage.loop
+        if loop is not None:
+            live.update(loop.outputs, (s.args[0] for s in loop.sums))
+            loop = replace(loop, body=_used(loop.body, live))
+        stages[k] = replace(stage, preamble=_used(stage.preamble, live), loop=loop)
     return replace(plan, stages=tuple(stages))
+
+
+def _used(block: Sequence[Statement], live: set[Node]) -> list[Statement]:
+    """Statements whose values are used, of a block before which `live` grows by what they need.
+
+    A sum that is added up in another order may be a value that is there already; what had been
+    computed for it is then needed no more.
+    """
+    out: list[Statement] = []
+    for s in reversed(block):
+        if isinstance(s, If):
+            live.update(a for n in s.merged for a in n.args)
+            sides = [_used(side, live) for side in (s.then, s.otherwise)]
+            out.append(If(s.condition, s.merged, *sides))
+        elif isinstance(s, Same):
+            if s.old in live:
+                live.add(s.new)
+                out.append(s)
+        elif s in live:
+            live.update(s.args)
+            out.append(s)
+    return out[::-1]
 
 
 def _runs(block: Sequence[Statement]) -> Iterator[list[Statement]]:

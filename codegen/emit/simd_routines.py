@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from softehl.codegen.emit import array_routines, c_routines
+from softehl.codegen.emit import array_routines, c_routines, tensor_routines
 from softehl.codegen.emit.c_printer import number
 from softehl.codegen.emit.simd_printer import LanePrinter
+from softehl.codegen.graph.divided_difference import Quotient, SecondQuotient
 from softehl.codegen.graph.graph import Routine
 from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine, Network
+from softehl.codegen.graph.tensor_functions import Kernel
 from softehl.codegen.language.definition import Definition
 
 
@@ -28,7 +30,10 @@ def _text(d: Definition, r: Routine) -> list[str]:
             return _newton(d, r)
         case Inverse():
             return [_inverse(d, r)]
-        case Isotropic() | External():
+        case Kernel() if tensor_routines.in_lanes(r):
+            unused = c_routines.arrays_unused(d)
+            return tensor_routines.text(r, _signature(d, r), unused, tensor_routines.LANES)
+        case Isotropic() | External() | Quotient() | SecondQuotient() | Kernel():
             return [*c_routines.texts(d, [r]), _one_by_one(d, r)]
         case Network():
             return array_routines.lanes(d, r, _signature(d, r))

@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.graph import Graph, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.guarded_products import Certain, exists, guarded, plus, shielded
 from softehl.codegen.graph.length_derivatives import by_square, slope, square_of
 from softehl.codegen.graph.partial_derivatives import Partials, partials
@@ -88,6 +88,7 @@ class _Reverse:
     adjoint: dict[Node, Node] = field(default_factory=dict)
     summands: dict[Node, Node] = field(default_factory=dict)
     _certain: Certain = field(default_factory=Certain)
+    _results: dict[Node, dict[int, Node]] = field(default_factory=dict)
 
     def run(self, root: Node) -> dict[Node, Node]:
         self.adjoint[root] = self.g.one
@@ -102,6 +103,8 @@ class _Reverse:
                 seed = self.adjoint[n] = self.g.name(f"d_{n.payload}", seed)
             if seed is not None and n not in self.stop and n not in self.depends.sources:
                 self._propagate(n, seed)
+            if n in self._results:
+                self._pull(n, self._results.pop(n))
         return self.adjoint
 
     def _hidden(self) -> list[Node]:
@@ -115,10 +118,37 @@ class _Reverse:
         if square_of(n) is not None and n not in self.depends.prescribed:
             self._accumulate(self.adjoint, n.args[0].args[1], self._by_square(n, seed))
             return
+        if n.op is Op.ITEM and self._is_joint(n):
+            assert isinstance(n.payload, ResultIndex)
+            self._results.setdefault(n.args[0], {})[n.payload.index] = seed
+            return
         for a, p in self._local(n):
             if self.depends(a):
-                into = self.summands if n.varying > a.varying and not self.flat else self.adjoint
-                self._accumulate(into, a, self._times(n, seed, p))
+                self._accumulate(self._into(n, a), a, self._times(n, seed, p))
+
+    def _into(self, n: Node, a: Node) -> dict[Node, Node]:
+        return self.summands if n.varying > a.varying and not self.flat else self.adjoint
+
+    def _is_joint(self, n: Node) -> bool:
+        """True for a result of a routine that takes the adjoints of all results at once."""
+        routine = n.args[0].payload
+        assert isinstance(routine, Routine)
+        return n not in self.depends.prescribed and routine.joint
+
+    def _pull(self, call: Node, seeds: dict[int, Node]) -> None:
+        """Adjoints of the operands of a routine; in a branch if all its results are."""
+        g, routine = self.g, call.payload
+        assert isinstance(routine, Routine)
+        sides = [_side(g, seed) for seed in seeds.values()]
+        c, zero_side, _ = sides[0]
+        common = c is not None and all(s[:2] == (c, zero_side) for s in sides)
+        if common:
+            seeds = {k: inside for k, (_, _, inside) in zip(seeds, sides, strict=True)}
+        for a, value in routine.pullback(g, call, seeds):
+            if self.depends(a):
+                if common and c is not None:
+                    value = g.branch(c, *((g.zero, value) if zero_side == 1 else (value, g.zero)))
+                self._accumulate(self._into(call, a), a, value)
 
     def _times(self, n: Node, seed: Node, p: Node) -> Node:
         """Adjoint of a value times one of its derivatives."""
@@ -171,6 +201,16 @@ class _Reverse:
 
     def _accumulate(self, into: dict[Node, Node], n: Node, value: Node) -> None:
         into[n] = plus(self.g, into[n], value) if n in into else value
+
+
+def _side(g: Graph, seed: Node) -> tuple[Node | None, int, Node]:
+    """Condition of a value that is zero on one side, which side, and the value of the other."""
+    inner = seed.args[0] if seed.op is Op.NEG else seed
+    if inner.op is not Op.BRANCH or g.zero not in inner.args[1:]:
+        return None, 0, seed
+    k = inner.args.index(g.zero, 1)
+    value = inner.args[3 - k]
+    return inner.args[0], k, g.neg(value) if seed.op is Op.NEG else value
 
 
 def directional(

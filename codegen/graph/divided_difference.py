@@ -15,6 +15,7 @@ from typing import Any
 
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.guarded_products import guarded, plus
+from softehl.codegen.graph.partial_derivatives import DifferentiationError
 from softehl.codegen.graph.traversal import reachable
 
 ROUNDING = Fraction(1, 2**48)
@@ -32,11 +33,50 @@ class Quotient(Routine):
 
     op: Op
 
+    def divided(self, between: Divided, call: Node) -> list[Node]:
+        """Divided difference of a quotient: first u moves, then v."""
+        if self.op is Op.ATAN2:
+            raise DifferentiationError("atan2 has no second divided difference; write atan(y / x)")
+        g = between.g
+        u, v, f_u, f_v, *exponent = call.args
+        if any(between.other[e] is not e for e in exponent):
+            raise DifferentiationError("the exponent of a power may not be an eigenvalue")
+        u2, v2, g_u, g_v = (between.other[a] for a in (u, v, f_u, f_v))
+
+        def twice(a: Node, b: Node, c: Node, values: Sequence[Node]) -> Node:
+            at, other, fixed = values
+            first = [(a, c, at, fixed), (b, c, other, fixed), (a, b, at, other)]
+            quotients = [g.run(self, [*pair, *exponent])[0] for pair in first]
+            return g.run(SECOND_QUOTIENTS[self.op], [a, b, c, *quotients, *exponent])[0]
+
+        total = g.zero
+        if between.rates[u] is not g.zero:
+            total = guarded(g, between.rates[u], twice(u, u2, v, (f_u, g_u, f_v)))
+        if between.rates[v] is not g.zero:
+            moved = guarded(g, between.rates[v], twice(v, v2, u2, (f_v, g_v, g_u)))
+            total = plus(g, total, moved)
+        return [total]
+
+
+@dataclass(frozen=True, eq=False)
+class SecondQuotient(Routine):
+    """Second divided difference f[u, v, w] of a function of the C library.
+
+    Operands u, v, w, then f[u, w], f[v, w] and f[u, v]; POWER has the exponent as a seventh.
+    """
+
+    op: Op
+
 
 QUOTIENTS = {
     op: Quotient(f"divided_{op}", {Op.POWER: 5, Op.ATAN2: 8}.get(op, 4), 1, op)
     for op in Op
     if op not in BOOLEAN
+}
+SECOND_QUOTIENTS = {
+    op: SecondQuotient(f"divided_twice_{op}", 6 + (op is Op.POWER), 1, op)
+    for op in QUOTIENTS
+    if op is not Op.ATAN2
 }
 
 
@@ -209,6 +249,13 @@ def _multiplied(g: Graph, a: Node, n: int) -> Node:
 
 def _inverted(g: Graph, a: Node, negative: bool) -> Node:
     return g.recip(a) if negative else a
+
+
+def nearly_equal(g: Graph, a: Node, b: Node) -> Node:
+    """True if two values are equal but for their rounding."""
+    gap, size = g.sub(a, b), g.add(g.mul(a, a), g.mul(b, b))
+    bound = g.mul(g.const(2 * ROUNDING**2), size)
+    return g.compare(Op.LE, g.mul(gap, gap), bound)
 
 
 def exchange_inputs(g: Graph, values: Sequence[Node], a: Node, b: Node) -> Divided:

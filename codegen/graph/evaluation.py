@@ -15,10 +15,20 @@ from typing import Any
 import mpmath
 from mpmath.libmp import NoConvergence
 
+from softehl.codegen.graph import matrix_functions
 from softehl.codegen.graph.graph import Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.precise_arithmetic import arctangent, number
 from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton, depends
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine
+from softehl.codegen.graph.tensor_functions import (
+    Eigenvalues,
+    Exponential,
+    Part,
+    TensorFunction,
+    TensorRoutine,
+    entry_pairs,
+)
+from softehl.codegen.graph.tensor_functions import Isotropic as TensorIsotropic
 from softehl.codegen.graph.traversal import Recursion, reachable, recursion
 
 Number = Any
@@ -45,6 +55,8 @@ def results(r: Routine, args: Vector, evaluate: Evaluate) -> Vector:
             return [mpmath.nan] * r.outputs if values is None else values
         case ArrayRoutine():  # of any array, where none is given
             return _of_array(r, exact(r.layout.sample(random.Random(r.name))), (), args)
+        case TensorRoutine():
+            return _tensor(r, args, evaluate)
     raise TypeError(f"no value for {r}")
 
 
@@ -116,6 +128,54 @@ def _energy(r: Isotropic, args: Vector, evaluate: Evaluate) -> Number:
     a, b, c, d, e, f = args[:6]
     eigenvalues = mpmath.eigsy(mpmath.matrix([[a, d, e], [d, b, f], [e, f, c]]), eigvals_only=True)
     return evaluate([r.energy], list(eigenvalues), args[6:])[0]
+
+
+def _tensor(r: TensorRoutine, args: Vector, evaluate: Evaluate) -> Vector:
+    """A part of a tensor function: its derivatives are differences of its value."""
+    f = r.function
+    n = f.entries
+    external, p = args[n : n + f.externals], args[n + f.externals :]
+    h = mpmath.mpf(10) ** (-mpmath.mp.dps // 4)
+
+    def value(x: Vector) -> Vector:
+        return _tensor_value(f, x, external, evaluate)
+
+    def rate(x: Vector, j: int, of: Callable[[Vector], Vector]) -> Vector:
+        ends = [of([v + t * h * (k == j) for k, v in enumerate(x)]) for t in (1, -1)]
+        return [(a - b) / (2 * h) for a, b in zip(*ends, strict=True)]
+
+    x = args[:n]
+    if r.part is Part.VALUE:
+        return value(x)
+    if r.part is Part.CURVATURE:
+        return [
+            mpmath.fdot(p, rate(x, i, lambda x, j=j: rate(x, j, value)))
+            for i in range(n)
+            for j in range(i, n)
+        ]
+    slopes = [rate(x, j, value) for j in range(n)]
+    if r.part is Part.ADJOINT:
+        return [mpmath.fdot(p, column) for column in slopes]
+    results = []
+    for k in range(f.slopes):
+        i, j, factor = f.slope_index(k)
+        results.append(slopes[j][i] * factor.numerator / factor.denominator)
+    return results
+
+
+def _tensor_value(f: TensorFunction, x: Vector, external: Vector, evaluate: Evaluate) -> Vector:
+    n = f.size
+    if isinstance(f, Exponential):
+        return matrix_functions.exponential(x)
+    pairs = entry_pairs(n)
+    full = [x[pairs.index((min(i, j), max(i, j)))] for i in range(n) for j in range(n)]
+    c, Q = matrix_functions.eigenvectors(full, mpmath.sqrt)
+    if isinstance(f, Eigenvalues):
+        return sorted(c, reverse=True)
+    assert isinstance(f, TensorIsotropic)
+    assert f.f is not None
+    at = [evaluate([f.f], [a], external)[0] for a in c]
+    return [mpmath.fsum(v * Q[i][a] * Q[j][a] for a, v in enumerate(at)) for i, j in pairs]
 
 
 def symmetric(value: Node, unknowns: Sequence[Node]) -> bool:

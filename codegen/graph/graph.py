@@ -14,7 +14,7 @@ is one of the results.  The routine says how it is differentiated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
@@ -108,6 +108,15 @@ class Routine:
     def partials(self, g: Graph, item: Node) -> list[tuple[Node, Node]]:
         """Derivatives of one result with respect to the operands it depends on."""
         raise NotImplementedError
+
+    def pullback(self, g: Graph, call: Node, seeds: Mapping[int, Node]) -> list[tuple[Node, Node]]:
+        """Adjoints of the operands from those of all results, if it is `joint`."""
+        raise NotImplementedError
+
+    @property
+    def joint(self) -> bool:
+        """True if adjoints of operands come from those of all results at once (`pullback`)."""
+        return False
 
     def divided(self, between: Any, call: Node) -> list[Node]:
         """Divided differences of all results between two states; see `divided_difference`."""

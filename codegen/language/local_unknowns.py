@@ -9,10 +9,9 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.elements.quadrature import QuadratureRule
-from softehl.codegen.graph.evaluation import alike, symmetric
+from softehl.codegen.graph.evaluation import symmetric
 from softehl.codegen.graph.graph import Graph, Input, Node, Op
 from softehl.codegen.graph.routines import (
-    SYMMETRIC,
     Control,
     External,
     Isotropic,
@@ -27,6 +26,7 @@ from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.flatten import Entries, call_function, fraction
 from softehl.codegen.language.named_symbols import placeholders
 from softehl.codegen.language.sympy_lowering import Symbols
+from softehl.codegen.language.tensor_functions import symmetric_entries
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def principal(
         raise ModelError(
             f"{name}: write m.principal({name!r}, C, lambda a, b, c: ...), e.g. with C = F.T * F"
         )
-    entries = _symmetric_entries(symbols, name, C)
+    _, entries = symmetric_entries(symbols, name, C, (3,))
     squares = Entries(placeholders(3, positive=True), ("", "", ""), list)
     local = symbols.placeholders(name, squares)
     written = call_function(name, energy, *(sp.sqrt(c) for c in squares.values))
@@ -143,20 +143,3 @@ def principal(
         symbols.name(name, node, [*C, written], has_definition=False), written, squares.values, C
     )
     return symbol
-
-
-def _symmetric_entries(symbols: Symbols, name: str, C: Any) -> list[Node]:
-    """Entries of the symmetric part of C, which has those of C: both triangles vary alike."""
-    if getattr(C, "shape", None) != (3, 3):
-        shape = getattr(C, "shape", "that of a scalar or list")
-        raise ModelError(f"{name}: C has shape {shape}, must be (3, 3)")
-    entries = []
-    for i, j in SYMMETRIC:
-        upper, lower = symbols.lower(C[i, j]), symbols.lower(C[j, i])
-        if not alike(upper, lower):
-            raise ModelError(
-                f"{name}: C is not symmetric, C[{i}, {j}] is not C[{j}, {i}]; e.g. C = F.T * F"
-            )
-        same = upper is lower
-        entries.append(upper if same else symbols.lower((C[i, j] + C[j, i]) / 2))
-    return entries

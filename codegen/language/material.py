@@ -40,7 +40,8 @@ class Material:
         Name of the law.
     model : Model
         Model that the law is part of. Its `parameters`, `require`, `point_data`, `history`,
-        `fields`, `norm`, `derivative`, `example`, `table` and `network` are methods here as well.
+        `fields`, `norm`, `derivative`, `example`, `table`, `network` and functions of tensors
+        (`log`, `sqrt`, `exp`, `power`, `isotropic`, `eigenvalues`) are methods here as well.
     W : Expr or None
         Energy per reference volume [MPa].
     P : Matrix or None
@@ -62,6 +63,8 @@ class Material:
         self.point_data, self.history, self.fields = model.point_data, model.history, model.fields
         self.norm, self.derivative, self.example = model.norm, model.derivative, model.example
         self.table, self.network = model.table, model.network
+        self.log, self.sqrt, self.exp, self.power = model.log, model.sqrt, model.exp, model.power
+        self.isotropic, self.eigenvalues = model.isotropic, model.eigenvalues
 
     @property
     def F(self) -> Any:

@@ -577,6 +577,127 @@ class Model(ModelBuilder):
             meaning=meaning,
         )
 
+    # functions of tensors -----------------------------------------------------------------------
+
+    def isotropic(self, C: Any, f: Callable[[Any], Any]) -> Any:
+        """Return a function of a symmetric tensor: the sum of f(c_a) n_a n_a.
+
+        Parameters
+        ----------
+        C : Matrix
+            Symmetric tensor (2, 2) or (3, 3) with eigenvalues c_a and eigenvectors n_a.
+        f : callable
+            Function of one eigenvalue, such as `lambda x: sp.Max(x, 0)`.
+
+        Returns
+        -------
+        Matrix
+            Symmetric tensor of the shape of C.
+
+        Raises
+        ------
+        ModelError
+            C has a wrong shape or is not symmetric, or f has no divided differences.
+
+        Notes
+        -----
+        First and second derivatives are exact to rounding, also at equal or nearly equal
+        eigenvalues. They are divided differences of f (Ju. L. Daleckii, S. G. Krein, AMS
+        Translations (2) 47 (1965) 1). Where a condition in f holds at one of two eigenvalues only,
+        they are quotients of the two values.
+        """
+        return self._tensors.isotropic("isotropic", C, f)
+
+    def log(self, C: Any) -> Any:
+        """Return the logarithm of a symmetric positive definite tensor.
+
+        Parameters
+        ----------
+        C : Matrix
+            (2, 2) or (3, 3), such as F.T * F.
+
+        Returns
+        -------
+        Matrix
+            Of the shape of C, see `isotropic`. Hencky's strain is m.log(F.T * F) / 2.
+        """
+        return self._tensors.isotropic("log", C, sp.log)
+
+    def sqrt(self, C: Any) -> Any:
+        """Return the square root of a symmetric positive definite tensor.
+
+        Parameters
+        ----------
+        C : Matrix
+            (2, 2) or (3, 3), such as F.T * F.
+
+        Returns
+        -------
+        Matrix
+            Of the shape of C, see `isotropic`. The right stretch tensor is m.sqrt(F.T * F).
+        """
+        return self._tensors.isotropic("sqrt", C, sp.sqrt)
+
+    def power(self, C: Any, exponent: Any) -> Any:
+        """Return a power of a symmetric tensor.
+
+        Parameters
+        ----------
+        C : Matrix
+            (2, 2) or (3, 3), positive definite unless the exponent is a positive whole number.
+        exponent : number or Expr
+            A number, a parameter, or another expression.
+
+        Returns
+        -------
+        Matrix
+            Of the shape of C, see `isotropic`.
+        """
+        return self._tensors.isotropic("power", C, lambda c: c**exponent)
+
+    def exp(self, A: Any) -> Any:
+        """Return the exponential of a matrix, which need not be symmetric.
+
+        Parameters
+        ----------
+        A : Matrix
+            (2, 2) or (3, 3).
+
+        Returns
+        -------
+        Matrix
+            Of the shape of A. Of a symmetric A as `isotropic`, of others by scaling and squaring,
+            with derivatives exact to rounding.
+
+        Raises
+        ------
+        ModelError
+            A has a wrong shape.
+        """
+        return self._tensors.exponential(A)
+
+    def eigenvalues(self, C: Any) -> tuple[Any, ...]:
+        """Return the eigenvalues of a symmetric tensor, the largest first.
+
+        Parameters
+        ----------
+        C : Matrix
+            (2, 2) or (3, 3).
+
+        Returns
+        -------
+        tuple of Symbol
+            Two or three.
+
+        Notes
+        -----
+        They are no smooth functions of C where two of them are equal: first derivatives are then
+        those along the computed eigenvectors, and the second derivatives, which grow as the
+        reciprocal of the distance, leave the pair out. What is symmetric in the eigenvalues is
+        smooth by `isotropic` and `principal`.
+        """
+        return self._tensors.eigenvalues(C)
+
     def derivative(self, name: str, value: Any, by: Any) -> Any:
         """Return derivatives of a scalar, such as P = dW/dF.
 

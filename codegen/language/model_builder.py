@@ -29,6 +29,7 @@ from softehl.codegen.language.errors import ModelError, NoEquationsError, page_l
 from softehl.codegen.language.flatten import CheckedList, Entries, Matrix
 from softehl.codegen.language.sympy_lowering import Symbols
 from softehl.codegen.language.sympy_tape import Integral
+from softehl.codegen.language.tensor_functions import TensorFunctions
 
 _TIMES = (
     ("rate", "coefficient of the time derivative [1/s]"),
@@ -539,6 +540,7 @@ class ModelBuilder:
         self.graph, self._lower = self._symbols.graph, self._symbols.lower
         self._arguments = Arguments(self._symbols, nodes)
         self._intermediates = Intermediates(self._symbols)
+        self._tensors = TensorFunctions(self._symbols)
         self._equations = Equations(self._symbols)
         self._outputs = Outputs(self._symbols)
         self._functions: dict[str, Node] = {}

@@ -65,6 +65,26 @@ class OfArray:
     args: tuple[Any, ...]
 
 
+class MatrixFunction:
+    """A function of a square matrix, given by its `entries` row by row.
+
+    kind: "isotropic" of a symmetric one, with the eigenvalue and f in `function`; "exponential";
+    "eigenvalues" of a symmetric one, the largest first.
+    """
+
+    kind: str
+    entries: tuple[Any, ...]
+    function: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True)
+class Result:
+    """Entry `index` of the results of a function."""
+
+    of: MatrixFunction
+    index: int
+
+
 @dataclass(frozen=True)
 class Slope:
     """Derivative of `value` by the quantity of a symbol."""
@@ -112,6 +132,13 @@ class SympyTape:
         """Note the names of the results of a C function of the user."""
         for k, symbol in enumerate(results):
             self.define(symbol, External(function, tuple(inputs), k))
+
+    def matrix_function(self, function: MatrixFunction, results: Sequence[Any]) -> None:
+        """Note a function of a matrix and the names of its results."""
+        for s in function.function[:1]:
+            self.meanings[s] = Local()
+        for k, s in enumerate(results):
+            self.define(s, Result(function, k))
 
     def derivatives(
         self, value: Any, by: Sequence[Any], symbols: Sequence[Any], shared: Sequence[int]

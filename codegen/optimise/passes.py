@@ -17,6 +17,7 @@ from softehl.codegen.external_function import ExternalFunction
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op
 from softehl.codegen.graph.precise_arithmetic import number
 from softehl.codegen.graph.routines import External
+from softehl.codegen.graph.tensor_functions import lower
 from softehl.codegen.graph.traversal import (
     Recursion,
     always,
@@ -277,6 +278,7 @@ def unrolled(points: Sequence[Sequence[Fraction]], data: tuple[int, int] = (0, 0
 
 
 STANDARD = (
+    Pass("tensor functions", lower),
     Pass("fold", fold),
     Pass("calls", calls),
     Pass("assume", assume),
@@ -294,6 +296,7 @@ def straight_line(
 ) -> tuple[Pass, ...]:
     """The passes of a kernel whose loop over the points is written out."""
     return (
+        Pass("tensor functions", lower),
         Pass("fold", fold),
         Pass("calls", calls),
         Pass("assume", assume),

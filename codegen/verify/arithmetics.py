@@ -113,6 +113,10 @@ class Exact:
         m = mpmath.matrix([[_mpf(v) for v in a[3 * i : 3 * i + 3]] for i in range(3)])
         return [_decimal(v) for v in mpmath.eigsy(m, eigvals_only=True)]
 
+    def disturbed(self, values: list[Number]) -> list[Number]:
+        """Eigenvalues as they are computed."""
+        return values
+
     def settled(self, slot: int, function: Function) -> Function:
         """The function of one operation of a program."""
         return function
@@ -136,7 +140,11 @@ class Rounded(Exact):
 
     def eigenvalues(self, a: Sequence[Number]) -> list[Number]:
         """Eigenvalues with separate rounding errors, which matter where they are nearly equal."""
-        return [v * _error(k, 3) for k, v in enumerate(super().eigenvalues(a))]
+        return self.disturbed(super().eigenvalues(a))
+
+    def disturbed(self, values: list[Number]) -> list[Number]:
+        """Eigenvalues with separate rounding errors."""
+        return [v * _error(k, 3) for k, v in enumerate(values)]
 
     def sum(self, slot: int, count: int) -> Function:
         """Sum with an error of every partial sum."""

@@ -23,6 +23,7 @@ from typing import Any, ParamSpec, TypeVar
 import mpmath
 from mpmath.libmp import NoConvergence
 
+from softehl.codegen.graph import matrix_functions
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.verify.arithmetics import CONTEXT, DIGITS, UNIT, Exact, Function, Number
 from softehl.codegen.verify.sympy_program import Program, Step
@@ -234,7 +235,26 @@ class Evaluation:
                 squares, energy = s.content
                 stretches = n.eigenvalues([row[a] for a in s.args])
                 return self._with(s, q, squares, stretches, (energy,))[0]
+            case "isotropic" | "eigenvalues" | "exponential":
+                return self._matrix_function(s, [row[a] for a in s.args], q)
         return None
+
+    def _matrix_function(self, s: Step, entries: Vector, q: int) -> Vector:
+        """All results, row by row."""
+        n = self.evaluator.arithmetic
+        if s.name == "exponential":
+            return matrix_functions.exponential(entries)
+        values, Q = matrix_functions.eigenvectors(entries, n.functions["sqrt"])
+        values = n.disturbed(values)
+        if s.name == "eigenvalues":
+            return sorted(values, reverse=True)
+        local, f = s.content
+        at = [self._with(s, q, local, [c], f)[0] for c in values]
+        return [
+            sum(v * x * y for v, x, y in zip(at, left, right, strict=True))
+            for left in Q
+            for right in Q
+        ]
 
     def _input(self, array: str, index: int, q: int) -> Number:
         number = self.evaluator.arithmetic.number

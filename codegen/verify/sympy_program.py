@@ -23,7 +23,9 @@ from softehl.codegen.language.sympy_tape import (
     Integral,
     Local,
     OfArray,
+    MatrixFunction,
     Principal,
+    Result,
     Slope,
     SympyTape,
 )
@@ -38,7 +40,8 @@ class Step:
 
     name: what is done with the operands in the slots `args`; content: what else it needs.
     inner: operations of a `solve` (its equations), of a `slope` (from the symbol to the value), of
-    a `stretches` (its energy). depends: arrays behind it. locals: local unknowns behind it.
+    a `stretches` (its energy), of an `isotropic` (its function). depends: arrays
+    behind it. locals: local unknowns behind it.
     """
 
     slot: int
@@ -164,6 +167,8 @@ class _Builder:
                 parts = (meaning.amount, *meaning.args)
             case External():
                 parts = meaning.inputs
+            case Result():
+                parts = (*meaning.of.function, *meaning.of.entries)
             case Slope():
                 parts = (meaning.value, meaning.by)
             case _:
@@ -219,6 +224,8 @@ class _Builder:
                 if key not in self._slots:
                     self._slots[key] = self._add("external", self._at(*m.inputs), m.function)
                 return self._add("item", (self._slots[key],), m.index)
+            case Result():
+                return self._add("item", (self._matrix_function(m.of),), m.index)
             case Slope():
                 (value,), (by,) = self._at(m.value), self._at(m.by)
                 inner = self._between((by,), (value,))
@@ -234,6 +241,16 @@ class _Builder:
             content = (unknowns, equations)
             self._slots[key] = self._add("solve", start, content, inner=inner)
         return self._add("item", (self._slots[key],), m.index)
+
+    def _matrix_function(self, m: MatrixFunction) -> int:
+        if m not in self._slots:
+            entries = self._at(*m.entries)
+            inner, content = (), ((), ())
+            if m.function:
+                (eigenvalue, f) = self._at(*m.function)
+                inner, content = self._between((eigenvalue,), (f,)), ((eigenvalue,), (f,))
+            self._slots[m] = self._add(m.kind, entries, content, inner=inner)
+        return self._slots[m]
 
     def _operation(self, e: Any) -> int:
         at = self._at(*self._parts(e))
@@ -286,10 +303,10 @@ class _Builder:
         slot = len(self.steps)
         local_unknowns: set[int] = {slot} if name == "local" else set()
         below = [self.steps[a] for a in args]
-        if name in ("solve", "stretches"):
+        if name in ("solve", "stretches", "isotropic"):
             unknowns, results = content
             below += [self.steps[k] for s in inner for k in s.args if k not in unknowns]
-            below += [self.steps[k] for k in (results if name == "solve" else (results,))]
+            below += [self.steps[k] for k in ((results,) if name == "stretches" else results)]
             hidden = set(unknowns)
         else:
             hidden = set()
@@ -321,7 +338,7 @@ def _needed(steps: Sequence[Step], roots: Iterable[int], stop: Iterable[int] = (
             needed.add(slot)
             s = steps[slot]
             waiting += s.args
-            if s.name == "solve":
+            if s.name in ("solve", "isotropic"):
                 waiting += s.content[1]
             elif s.name == "stretches":
                 waiting.append(s.content[1])
