@@ -289,7 +289,7 @@ def _used(block: Sequence[Statement], live: set[Node]) -> list[Statement]:
             sides = [_used(side, live) for side in (s.then, s.otherwise)]
             out.append(If(s.condition, s.merged, *sides))
         elif isinstance(s, Same):
-            if s.old in live:
+            if s.old in live or s.new in live:
                 live.add(s.new)
                 out.append(s)
         elif s in live:
