@@ -73,7 +73,7 @@ QUOTIENTS = {
     for op in Op
     if op not in BOOLEAN
 }
-SECOND_QUOTIENTS = {
+SECOND_QUOTIENTS: dict[Op, SecondQuotient] = {
     op: SecondQuotient(f"divided_twice_{op}", 6 + (op is Op.POWER), 1, op)
     for op in QUOTIENTS
     if op is not Op.ATAN2
@@ -212,7 +212,13 @@ class Divided:
         assert isinstance(n.payload, ResultIndex)
         assert isinstance(routine, Routine)
         if call not in self.calls:
-            self.calls[call] = routine.divided(self, call)
+            try:
+                self.calls[call] = routine.divided(self, call)
+            except NotImplementedError:
+                raise DifferentiationError(
+                    f"{routine.name} has no divided difference: it may not be a function of an "
+                    "eigenvalue"
+                ) from None
         return self.calls[call][n.payload.index]
 
     def derivatives(

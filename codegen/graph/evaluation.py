@@ -10,6 +10,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import mpmath
@@ -148,11 +149,8 @@ def _tensor(r: TensorRoutine, args: Vector, evaluate: Evaluate) -> Vector:
     if r.part is Part.VALUE:
         return value(x)
     if r.part is Part.CURVATURE:
-        return [
-            mpmath.fdot(p, rate(x, i, lambda x, j=j: rate(x, j, value)))
-            for i in range(n)
-            for j in range(i, n)
-        ]
+        along = [partial(rate, j=j, of=value) for j in range(n)]
+        return [mpmath.fdot(p, rate(x, i, along[j])) for i in range(n) for j in range(i, n)]
     slopes = [rate(x, j, value) for j in range(n)]
     if r.part is Part.ADJOINT:
         return [mpmath.fdot(p, column) for column in slopes]

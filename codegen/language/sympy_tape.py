@@ -65,6 +65,7 @@ class OfArray:
     args: tuple[Any, ...]
 
 
+@dataclass(frozen=True)
 class MatrixFunction:
     """A function of a square matrix, given by its `entries` row by row.
 

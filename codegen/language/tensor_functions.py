@@ -54,10 +54,8 @@ class TensorFunctions:
         function = Isotropic(label, f"m.{what}", size, len(system.external), f=system.values[0])
         try:
             function.differences(symbols.graph)
-        except (DifferentiationError, NotImplementedError) as failed:
-            raise ModelError(
-                f"m.{what}: {failed or 'its function of an eigenvalue holds m.sinc or the like'}"
-            ) from None
+        except DifferentiationError as failed:
+            raise ModelError(f"m.{what}: {failed}") from None
         record = MatrixFunction("isotropic", tuple(C), (local.values[0], written))
         below = [*C, written]
         return self._symmetric(label, function, [*entries, *system.external], below, record)
