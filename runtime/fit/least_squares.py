@@ -17,7 +17,7 @@ from softehl.runtime.fit.objective import StudyEvaluations
 from softehl.runtime.kernels.kernel_call import ArgumentError
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity.input_parsing import By
-from softehl.runtime.sensitivity.inputs import Input, Key, PageDatum, PageParameter
+from softehl.runtime.sensitivity.inputs import Input, Key, PageArray, PageDatum, PageParameter
 from softehl.runtime.sensitivity.jacobian import Entry, by_key, jacobian
 from softehl.runtime.sensitivity.quantities import PointValue, Quantity, ReactionSum
 from softehl.runtime.solve.solution import NotConverged
@@ -139,13 +139,15 @@ def _limits(inputs: Sequence[Input], bounds: Bounds) -> tuple[Array, Array]:
     for key in bounds:
         if key not in keys:
             raise StudyError(f"bounds: no input {key!r}; there are {join_names(map(str, keys))}")
-    pairs = [bounds.get(item.key, (-np.inf, np.inf)) for item in inputs]
-    sizes = [len(item.value) for item in inputs]
-    lower, upper = (
-        np.concatenate([np.full(n, pair[side]) for n, pair in zip(sizes, pairs, strict=True)])
-        for side in (0, 1)
-    )
-    return lower, upper
+    lower, upper = [], []
+    for item in inputs:
+        least, most = bounds.get(item.key, (-np.inf, np.inf))
+        low, high = np.full(len(item.value), least), np.full(len(item.value), most)
+        if isinstance(item, PageArray):
+            low, high = np.maximum(low, item.bounds[0]), np.minimum(high, item.bounds[1])
+        lower.append(low)
+        upper.append(high)
+    return np.concatenate(lower), np.concatenate(upper)
 
 
 _FAILED = (NotConverged, ArgumentError, ProblemError)

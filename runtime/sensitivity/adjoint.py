@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.sensitivity.element_derivatives import ElementDerivatives
-from softehl.runtime.sensitivity.inputs import Input
+from softehl.runtime.sensitivity.element_derivatives import ArrayRates, ElementDerivatives
+from softehl.runtime.sensitivity.inputs import ArraySeeds, Input
 from softehl.runtime.sensitivity.linearised_step import LinearisedStep
 from softehl.runtime.sensitivity.quantities import Quantity
 from softehl.runtime.sensitivity.tape import Tape, blocks_with_history, time_couplings
@@ -74,6 +74,9 @@ def _step(
         for column in moves.columns:
             if column.block in element_gradients:
                 column.pull(total, element_gradients[column.block].by(column.column))
+        for move in moves.arrays:
+            if move.block in element_gradients:
+                total += element_gradients[move.block].by_array(move, len(total))
         for prescribed in moves.prescribed:
             mask = prescribed.target >= 0
             rates = prescribed.factor[mask] * held_slope[prescribed.dofs[mask]]
@@ -132,6 +135,13 @@ class _ElementGradient:
             self._cached[column] = self._along(rows, None)
         return self._cached[column]
 
+    def by_array(self, move: ArraySeeds, count: int) -> Array:
+        """By the components of an input with which a run-time array moves, (count,)."""
+        zero_rows, gradient = self.elements.zero_rows(), np.zeros(count)
+        for k, seed in enumerate(np.eye(count)):
+            gradient[k] = self._along(zero_rows, None, {move.name: move.rate(seed)}).sum()
+        return gradient
+
     def by_history(self) -> Array:
         """By the point data before the step, (n, points, k)."""
         block = self.elements.block
@@ -152,10 +162,10 @@ class _ElementGradient:
                 gradient[:, :, k] += (self.mu * after).sum(axis=2)
         return gradient
 
-    def _along(self, rows: Array, history: Array | None) -> Array:
-        gradient = (self.left * self.elements.residual(rows, history)).sum(axis=1)
+    def _along(self, rows: Array, history: Array | None, arrays: ArrayRates | None = None) -> Array:
+        gradient = (self.left * self.elements.residual(rows, history, arrays)).sum(axis=1)
         if self.mu is not None and self.mu.any():
-            gradient += _dot(self.mu, self.elements.history(rows, None, history))
+            gradient += _dot(self.mu, self.elements.history(rows, None, history, arrays))
         return np.asarray(gradient)
 
 

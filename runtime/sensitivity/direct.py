@@ -54,12 +54,13 @@ def _step(
     step: LinearisedStep, moves: InputSeeds, seed: Array, state: _DirectState
 ) -> tuple[Array, Array]:
     """Go one step on along one component of an input."""
-    rows = _rows(step, moves, seed, state)
+    rows, arrays = _rows(step, moves, seed, state), _array_rates(step, moves, seed)
     parts: dict[str, Array] = {}
     for name, elements in step.blocks.items():
-        history = state.histories.get(name)
-        if rows.get(name) is not None or (history is not None and history.any()):
-            parts[name] = elements.residual(rows.get(name, elements.zero_rows()), history)
+        history, moving = state.histories.get(name), arrays.get(name)
+        if rows.get(name) is not None or moving or (history is not None and history.any()):
+            block_rows = rows.get(name, elements.zero_rows())
+            parts[name] = elements.residual(block_rows, history, moving)
     prescribed = np.zeros(len(step.tape.x))
     for h in moves.prescribed:
         mask = h.target >= 0
@@ -70,7 +71,7 @@ def _step(
         direction = dx[elements.block.dofs]
         block_rows = rows.get(name, elements.zero_rows())
         previous = state.histories.get(name)
-        after = elements.history(block_rows, direction, previous)
+        after = elements.history(block_rows, direction, previous, arrays.get(name))
         _keep_still(step, name, after, previous)
         state.histories[name] = after
     state.states = [dx, *state.states][:2]
@@ -85,6 +86,17 @@ def _keep_still(step: LinearisedStep, name: str, after: Array, previous: Array |
     for column, datum in enumerate(kernel.point_data):
         if datum not in kernel.history and previous is not None:
             after[:, :, column] = previous[:, :, column]
+
+
+def _array_rates(
+    step: LinearisedStep, moves: InputSeeds, seed: Array
+) -> dict[str, dict[str, Array]]:
+    """Rates of the run-time arrays that move, by block and name."""
+    rates: dict[str, dict[str, Array]] = {}
+    for move in moves.arrays:
+        if move.block in step.blocks:
+            rates.setdefault(move.block, {})[move.name] = move.rate(seed)
+    return rates
 
 
 def _rows(

@@ -6,8 +6,9 @@ nodes a central difference of order 6 is taken, of which rounding is left: 1e-12
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -16,8 +17,11 @@ from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.kernels.kernel import Kernel
+from softehl.runtime.kernels.run_time_arrays import packed, unpacked
 from softehl.runtime.sensitivity.tape import Tape
 
+ArrayRates: TypeAlias = Mapping[str, Array]
+"""Rates of run-time arrays by name, as C reads these."""
 _WIDE = 1e-3
 """Of the size of an element: step of a difference of order 6, whose own error is then 1e-18."""
 _WEIGHTS = ((1, 45.0), (2, -9.0), (3, 1.0))
@@ -48,18 +52,26 @@ class ElementDerivatives:
         """Rows (n, width) of arguments that do not move."""
         return np.zeros((self.n, self.width))
 
-    def residual(self, rows: Array, history: Array | None = None) -> Array:
+    def residual(
+        self, rows: Array, history: Array | None = None, arrays: ArrayRates | None = None
+    ) -> Array:
         """Rate of the residuals (n, ndof) along rows (n, width), unknowns held.
 
-        history: (n, points, k) rates of the point data.
+        history: (n, points, k) rates of the point data. arrays: rates of run-time arrays by name.
         """
         if self.page is None:
             return self._load(rows)
         kernel = self._kernel("pseudo_load")
-        arguments = self._arguments(history)
+        arguments = self._arguments(history, arrays)
         return kernel.pseudo_load(self.block.coordinates, self.dofs, rows, **arguments)
 
-    def history(self, rows: Array, dofs: Array | None, history: Array | None = None) -> Array:
+    def history(
+        self,
+        rows: Array,
+        dofs: Array | None,
+        history: Array | None = None,
+        arrays: ArrayRates | None = None,
+    ) -> Array:
         """Rate of the point data after the step, (n, points, k), along a variation of all.
 
         dofs: (n, ndof) rates of the unknowns, None for none.
@@ -67,7 +79,7 @@ class ElementDerivatives:
         assert self.page is not None
         kernel, direction = self._kernel("fields_rate"), np.zeros_like(self.dofs)
         along = np.hstack([rows, direction if dofs is None else dofs])
-        arguments = self._arguments(history)
+        arguments = self._arguments(history, arrays)
         rates = kernel.fields_rate(self.block.coordinates, self.dofs, along, **arguments)
         page = self.page.kernel
         after = np.zeros((*rates.shape[:2], len(page.point_data)))
@@ -76,13 +88,22 @@ class ElementDerivatives:
             after[:, :, page.point_data.index(name)] = rates[:, :, column]
         return after
 
-    def _arguments(self, history: Array | None) -> dict[str, Any]:
+    def _arguments(self, history: Array | None, rates: ArrayRates | None) -> dict[str, Any]:
         block = self.block
-        arguments = block.given(self.parameters)
+        arguments = block.given(self.parameters if not rates else self._moving(rates))
         if block.point_data is None:
             return arguments
         direction = np.zeros_like(block.point_data) if history is None else history
         return {**arguments, "point_data": np.concatenate([block.point_data, direction], axis=2)}
+
+    def _moving(self, rates: ArrayRates) -> Array:
+        """The parameters with the rates of some run-time arrays."""
+        assert self.page is not None
+        kernel = self.page.kernel
+        count = len(kernel.parameters)
+        arrays = unpacked(self.parameters, count, len(kernel.arrays))
+        moving = [rates.get(a.name) for a in kernel.arrays]
+        return packed(self.parameters[:count], arrays, moving)
 
     def _kernel(self, task: str) -> Kernel:
         """The kernel of derivatives.  Raises StudyError where there is none."""

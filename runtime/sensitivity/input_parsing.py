@@ -19,6 +19,7 @@ from softehl.runtime.sensitivity.inputs import (
     Input,
     LoadAmount,
     NodeCoordinates,
+    PageArray,
     PageDatum,
     PageParameter,
     SupportValue,
@@ -91,8 +92,10 @@ def _of_page(owner: str, name: str, blocks: list[Block]) -> Input:
         return PageParameter((owner, name), blocks)
     if name in blocks[0].data:
         return PageDatum((owner, name), blocks)
+    if name in blocks[0].arrays:
+        return PageArray((owner, name), blocks)
     numbers = [n for n in blocks[0].parameters if n not in kernel.functions]
-    names = [*numbers, *blocks[0].data]
+    names = [*numbers, *blocks[0].data, *blocks[0].arrays]
     raise StudyError(
         f"by: {owner!r} ({kernel.name}) has no {name!r}{did_you_mean(name, names)}; it has "
         f"{join_names(names)}"

@@ -62,11 +62,28 @@ class PrescribedSeeds:
 
 
 @dataclass(frozen=True, eq=False)
+class ArraySeeds:
+    """A run-time array of the elements of a block that moves with all components of an input.
+
+    slope: (n, k) derivatives of its numbers by the components, None for the unit matrix.
+    """
+
+    block: str
+    name: str
+    slope: Array | None
+
+    def rate(self, seed: Array) -> Array:
+        """Rate (n,) of the numbers when the input moves by seed (k,)."""
+        return seed if self.slope is None else np.asarray(self.slope @ seed)
+
+
+@dataclass(frozen=True, eq=False)
 class InputSeeds:
     """All that moves with an input in one step."""
 
     columns: Sequence[InputColumn] = field(default=())
     prescribed: Sequence[PrescribedSeeds] = field(default=())
+    arrays: Sequence[ArraySeeds] = field(default=())
 
 
 Key: TypeAlias = tuple[str, str]
@@ -133,6 +150,38 @@ class PageParameter:
             parameters = {**definition.blocks[block.name].parameters, self.key[1]: changed_value}
             changed = replace(definition.blocks[block.name], parameters=parameters)
             definition.blocks[block.name] = changed
+
+
+@dataclass(frozen=True, eq=False)
+class PageArray:
+    """Values of a curve, or weights of a network, of a page on one kind of cells or several."""
+
+    key: Key
+    blocks: Sequence[Block]
+    scalar: bool = False
+
+    @property
+    def value(self) -> Array:
+        """See `Input`."""
+        return self.blocks[0].arrays[self.key[1]].values.copy()
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Smallest and largest allowed components, (k,) each."""
+        return self.blocks[0].arrays[self.key[1]].bounds
+
+    def seeds(self, tape: Tape) -> InputSeeds:
+        """See `Input`."""
+        name = self.key[1]
+        moves = [ArraySeeds(b.name, name, b.arrays[name].slope()) for b in self.blocks]
+        return InputSeeds(arrays=moves)
+
+    def put(self, definition: ProblemDefinition, value: Array) -> None:
+        """See `Input`."""
+        for block in self.blocks:
+            arrays = dict(definition.blocks[block.name].arrays)
+            arrays[self.key[1]] = arrays[self.key[1]].with_values(value)
+            definition.blocks[block.name] = replace(definition.blocks[block.name], arrays=arrays)
 
 
 @dataclass(frozen=True, eq=False)
