@@ -13,7 +13,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Sequence
 
-from softehl.codegen.emit import array_routines, tensor_routines
+from softehl.codegen.emit import array_routines, tensor_routines, term_loops
 from softehl.codegen.emit.c_printer import Printer, number
 from softehl.codegen.emit.code_motion import schedule
 from softehl.codegen.external_function import LOWEST_ADDRESS
@@ -28,6 +28,7 @@ from softehl.codegen.graph.routines import (
 )
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine
 from softehl.codegen.graph.tensor_functions import Kernel
+from softehl.codegen.graph.term_reductions import Reduction
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
@@ -168,6 +169,11 @@ def _text(d: Definition, r: Routine) -> list[str]:
             return [_JACOBI, *_isotropic(d, r)]
         case Quotient():
             return quotient(r.op, _signature(d, r), arrays_unused(d))
+        case Reduction():
+            values, targets = term_loops.bodies(r)
+            body = Body(d, d.graph, values, Printer(d))
+            loop = term_loops.single(d, r, _signature(d, r), body.text(2, targets))
+            return [*texts(d, body.called), loop]
         case ArrayRoutine():
             return array_routines.single(d, r, _signature(d, r))
         case External():

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from softehl.codegen.emit import array_routines, c_routines, tensor_routines
+from softehl.codegen.emit import array_routines, c_routines, tensor_routines, term_loops
 from softehl.codegen.emit.c_printer import number
 from softehl.codegen.emit.simd_printer import LanePrinter
 from softehl.codegen.graph.divided_difference import Quotient, SecondQuotient
@@ -16,6 +16,7 @@ from softehl.codegen.graph.graph import Routine
 from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine, Network
 from softehl.codegen.graph.tensor_functions import Kernel
+from softehl.codegen.graph.term_reductions import Reduction
 from softehl.codegen.language.definition import Definition
 
 
@@ -35,6 +36,11 @@ def _text(d: Definition, r: Routine) -> list[str]:
             return tensor_routines.text(r, _signature(d, r), unused, tensor_routines.LANES)
         case Isotropic() | External() | Quotient() | SecondQuotient() | Kernel():
             return [*c_routines.texts(d, [r]), _one_by_one(d, r)]
+        case Reduction():
+            values, targets = term_loops.bodies(r)
+            body = c_routines.Body(d, d.graph, values, LanePrinter(d, "active"))
+            loop = term_loops.lanes(d, r, _signature(d, r), body.text(2, targets))
+            return [*texts(d, body.called), loop]
         case Network():
             return array_routines.lanes(d, r, _signature(d, r))
         case ArrayRoutine():

@@ -30,6 +30,7 @@ from softehl.codegen.graph.tensor_functions import (
     entry_pairs,
 )
 from softehl.codegen.graph.tensor_functions import Isotropic as TensorIsotropic
+from softehl.codegen.graph.term_reductions import Reduction, TermsLayout
 from softehl.codegen.graph.traversal import Recursion, reachable, recursion
 
 Number = Any
@@ -382,10 +383,20 @@ class Walk:
         return _UNARY[n.op](*args) if len(args) == 1 else _BINARY[n.op](*args)
 
     def _results(self, r: Routine, operands: Vector) -> Vector:
+        if isinstance(r, Reduction):
+            return self._reduced(r, operands)
         if isinstance(r, ArrayRoutine) and self.state.arrays:
             rate = exact(self.state.array_rates[r.array]) if self.state.array_rates else ()
             return _of_array(r, exact(self.state.arrays[r.array]), rate, operands)
         return results(r, operands, self._local)
+
+    def _reduced(self, r: Reduction, operands: Vector) -> Vector:
+        count = len(r.arrays)
+        rates = self.state.array_rates or [()] * len(self.state.arrays)
+        arrays = [(exact(self.state.arrays[k]), exact(rates[k])) for k in r.arrays]
+        if not self.state.arrays:  # of any arrays, where none are given
+            arrays = [(exact(TermsLayout().sample(random.Random(k))), []) for k in range(count)]
+        return r.results(r.graph, arrays, operands, self._local)
 
     def _local(self, values: Sequence[Node], local: Vector, external: Vector) -> Vector:
         """Localised values of a routine."""

@@ -156,6 +156,8 @@ class Definition:
         The model at a point.
     arrays : tuple of RunTimeArray
         Arrays of any length that each call gives: curves, weights of networks.
+    term_groups : tuple of tuple of str
+        Arrays of terms that have equal lengths.
     record : Record
         The model as it was written, by which kernels are checked.
     statements : tuple of Statement
@@ -207,6 +209,8 @@ class Definition:
     """The same model at a point, from which the kernel of the whole element can be made as well."""
     arrays: tuple[RunTimeArray, ...] = ()
     """Arrays of any length, the same for all elements of a call."""
+    term_groups: tuple[tuple[str, ...], ...] = ()
+    """Arrays of terms that stand in one sum, and so have equal lengths."""
     record: SympyTape = field(default_factory=SympyTape, repr=False, compare=False)
     """The model as written, by which kernels are checked; nothing is derived from it."""
     statements: tuple[Statement, ...] = field(default=(), repr=False, compare=False)

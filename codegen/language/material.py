@@ -40,8 +40,9 @@ class Material:
         Name of the law.
     model : Model
         Model that the law is part of. Its `parameters`, `require`, `point_data`, `history`,
-        `fields`, `norm`, `derivative`, `example`, `table`, `network` and functions of tensors
-        (`log`, `sqrt`, `exp`, `power`, `isotropic`, `eigenvalues`) are methods here as well.
+        `fields`, `norm`, `derivative`, `example`, `table`, `network`, `array`, `sum`, `product`,
+        `minimum`, `maximum` and functions of tensors (`log`, `sqrt`, `exp`, `power`, `isotropic`,
+        `eigenvalues`) are methods here as well.
     W : Expr or None
         Energy per reference volume [MPa].
     P : Matrix or None
@@ -62,9 +63,11 @@ class Material:
         self.parameters, self.require = model.parameters, model.require
         self.point_data, self.history, self.fields = model.point_data, model.history, model.fields
         self.norm, self.derivative, self.example = model.norm, model.derivative, model.example
-        self.table, self.network = model.table, model.network
+        self.table, self.network, self.array = model.table, model.network, model.array
         self.log, self.sqrt, self.exp, self.power = model.log, model.sqrt, model.exp, model.power
         self.isotropic, self.eigenvalues = model.isotropic, model.eigenvalues
+        self.sum, self.product = model.sum, model.product
+        self.minimum, self.maximum = model.minimum, model.maximum
 
     @property
     def F(self) -> Any:

@@ -14,11 +14,18 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language import external_functions, local_unknowns, run_time_functions
+from softehl.codegen.graph.term_reductions import Kind
+from softehl.codegen.language import (
+    external_functions,
+    local_unknowns,
+    run_time_functions,
+    run_time_terms,
+)
 from softehl.codegen.language.definition import Argument, Definition
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.flatten import CheckedList
 from softehl.codegen.language.model_builder import ModelBuilder
+from softehl.codegen.language.run_time_terms import TermArray
 
 __all__ = ["Argument", "Definition", "Model"]
 
@@ -523,6 +530,117 @@ class Model(ModelBuilder):
             interpolation=interpolation,
             outside=outside,
         )
+
+    def array(self, name: str, meaning: str = "") -> TermArray:
+        """Declare an array with one number for each term of a sum, as many as each call gives.
+
+        Parameters
+        ----------
+        name : str
+            Name, by which `Study.add` gets its numbers: g=[0.3, 0.2, 0.1].
+        meaning : str
+            Meaning of its numbers, with their unit.
+
+        Returns
+        -------
+        TermArray
+            The array, for `sum`, `product`, `minimum` and `maximum`.
+
+        Raises
+        ------
+        ModelError
+            The name belongs to something else.
+        """
+        return run_time_terms.array(self._symbols, self._arguments.array, name, meaning)
+
+    def sum(self, *arrays_and_function: Any) -> Any:
+        """Return the sum of a function of the entries of arrays over their terms.
+
+        Parameters
+        ----------
+        *arrays_and_function : TermArray, then callable
+            Arrays of equal length, and a function of one entry of each, as in
+            m.sum(g, tau, lambda g, tau: g * exp(-t / tau)). It returns a scalar, list or matrix.
+
+        Returns
+        -------
+        Symbol, list or Matrix
+            The sum. Its derivatives are exact, also by the entries.
+
+        Raises
+        ------
+        ModelError
+            An argument is no array, or the last one no function.
+
+        Notes
+        -----
+        The kernel has one loop over the terms, whatever their number is.
+        """
+        return self._reduced(Kind.SUM, arrays_and_function)
+
+    def _reduced(self, kind: Kind, given: Sequence[Any]) -> Any:
+        groups = self._arguments.term_groups
+        return run_time_terms.reduced(self._symbols, groups, kind, given)
+
+    def product(self, *arrays_and_function: Any) -> Any:
+        """Return the product of a function of the entries of arrays over their terms; as `sum`.
+
+        Parameters
+        ----------
+        *arrays_and_function : TermArray, then callable
+            Arrays of equal length, and a function of one entry of each.
+
+        Returns
+        -------
+        Symbol, list or Matrix
+            The product. Its derivatives are exact where a factor is zero, too.
+
+        Raises
+        ------
+        ModelError
+            An argument is no array, or the last one no function.
+        """
+        return self._reduced(Kind.PRODUCT, arrays_and_function)
+
+    def minimum(self, *arrays_and_function: Any) -> Any:
+        """Return the smallest value of a function of the entries of arrays; as `sum`.
+
+        Parameters
+        ----------
+        *arrays_and_function : TermArray, then callable
+            Arrays of equal length, and a function of one entry of each.
+
+        Returns
+        -------
+        Symbol, list or Matrix
+            The smallest value; its derivatives are those of the first such term.
+
+        Raises
+        ------
+        ModelError
+            An argument is no array, or the last one no function.
+        """
+        return self._reduced(Kind.MINIMUM, arrays_and_function)
+
+    def maximum(self, *arrays_and_function: Any) -> Any:
+        """Return the largest value of a function of the entries of arrays; as `sum`.
+
+        Parameters
+        ----------
+        *arrays_and_function : TermArray, then callable
+            Arrays of equal length, and a function of one entry of each.
+
+        Returns
+        -------
+        Symbol, list or Matrix
+            The largest value; its derivatives are those of the first such term.
+
+        Raises
+        ------
+        ModelError
+            An argument is no array, or the last one no function.
+        """
+        return self._reduced(Kind.MAXIMUM, arrays_and_function)
 
     def network(
         self,

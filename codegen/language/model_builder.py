@@ -60,6 +60,7 @@ class Arguments:
         self.conditions: list[Condition] = []
         self.example: dict[str, float] = {}
         self.arrays: list[RunTimeArray] = []
+        self.term_groups: dict[tuple[str, ...], None] = {}
         self._declared: dict[str, tuple[Node, str]] = {}
         self._idle: set[str] = set()
 
@@ -602,6 +603,7 @@ class ModelBuilder:
             history=tuple(name for name, _ in o.history),
             internal=tuple(a.internal),
             arrays=tuple(a.arrays),
+            term_groups=tuple(a.term_groups),
             functions=tuple(self._functions),
             record=self._symbols.record,
             statements=tuple(self._symbols.statements),

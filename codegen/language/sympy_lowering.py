@@ -312,6 +312,7 @@ class Symbols:
         self.bound: dict[sp.Symbol, Node] = {}
         self.lower = Lowering(self.graph, self.bound)
         self.statements: list[Statement] = []
+        self._counts: dict[str, int] = {}
         self.routines: dict[Any, Any] = {}
         """Routines of run-time arrays, and labels of their values by their arguments."""
         self._by_label: dict[str, Any] = {}
@@ -326,6 +327,11 @@ class Symbols:
             for s, n in self.bound.items()
             if isinstance(n.payload, Input) and n.payload.array != "arrays"
         }
+
+    def numbered(self, label: str) -> str:
+        """The label with the number of those before it."""
+        self._counts[label] = self._counts.get(label, 0) + 1
+        return f"{label}_{self._counts[label]}"
 
     def label_of(self, node: Node) -> str | None:
         """Label of the first symbol of a node."""

@@ -87,6 +87,16 @@ class Result:
 
 
 @dataclass(frozen=True)
+class Terms:
+    """Reduction of `value`, a function of the `entries` of arrays whose variation has `amounts`."""
+
+    kind: str
+    entries: tuple[Any, ...]
+    amounts: tuple[Any, ...]
+    value: Any
+
+
+@dataclass(frozen=True)
 class Slope:
     """Derivative of `value` by the quantity of a symbol."""
 
@@ -140,6 +150,20 @@ class SympyTape:
             self.meanings[s] = Local()
         for k, s in enumerate(results):
             self.define(s, Result(function, k))
+
+    def reduction(
+        self,
+        kind: str,
+        entries: Sequence[Any],
+        amounts: Sequence[Any],
+        values: Sequence[Any],
+        symbols: Sequence[Any],
+    ) -> None:
+        """Note the names of reductions over terms."""
+        for s in entries:
+            self.meanings[s] = Local()
+        for value, symbol in zip(values, symbols, strict=True):
+            self.define(symbol, Terms(kind, tuple(entries), tuple(amounts), value))
 
     def derivatives(
         self, value: Any, by: Sequence[Any], symbols: Sequence[Any], shared: Sequence[int]

@@ -14,10 +14,11 @@ from fractions import Fraction
 import mpmath
 
 from softehl.codegen.external_function import ExternalFunction
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, ResultIndex
 from softehl.codegen.graph.precise_arithmetic import number
 from softehl.codegen.graph.routines import External
 from softehl.codegen.graph.tensor_functions import lower
+from softehl.codegen.graph.term_reductions import Entry, Reduction
 from softehl.codegen.graph.traversal import (
     Recursion,
     always,
@@ -74,10 +75,12 @@ def fold(g: Graph, roots: Roots) -> Roots:
 
 
 def calls(g: Graph, roots: Roots) -> Roots:
-    """Values and derivatives of a C function of the user by one call.
+    """Values and derivatives by one call: of a C function of the user, of a loop over terms.
 
-    The results of a lower order are the first ones of a higher order.
+    The results of a C function of a lower order are the first ones of a higher order; a loop has
+    all results that are asked for.
     """
+    roots = _loops(g, roots)
     highest: dict[tuple[ExternalFunction, tuple[Node, ...]], External] = {}
     for n in reachable(roots):
         if isinstance(n.payload, External):
@@ -91,6 +94,32 @@ def calls(g: Graph, roots: Roots) -> Roots:
         payload = n.payload
         if isinstance(payload, External):
             payload = highest[payload.function, n.args]
+        return g.rebuild(n.op, args, payload)
+
+    return rewrite(g, roots, rule)
+
+
+def _loops(g: Graph, roots: Roots) -> Roots:
+    """One loop over terms for all results with the same operands."""
+    wanted: dict[tuple[int, tuple[Node, ...]], dict[Entry, None]] = {}
+    for n in reachable(roots):
+        call = n.args[0] if n.op is Op.ITEM else n
+        if isinstance(call.payload, Reduction) and isinstance(n.payload, ResultIndex):
+            key = call.payload.root, call.args
+            wanted.setdefault(key, {})[call.payload.entries[n.payload.index]] = None
+    if not wanted:
+        return roots
+    together = {key: tuple(sorted(entries)) for key, entries in wanted.items()}
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        payload, call = n.payload, n.args[0] if n.op is Op.ITEM else n
+        loop = call.payload
+        if isinstance(loop, Reduction):
+            entries = together.get((loop.root, call.args), loop.entries)
+            if isinstance(payload, ResultIndex):
+                payload = ResultIndex(entries.index(loop.entries[payload.index]))
+            else:
+                payload = loop.with_entries(entries)
         return g.rebuild(n.op, args, payload)
 
     return rewrite(g, roots, rule)

@@ -72,6 +72,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "places": [list(dof) for dof in d.dof_nodes],
         "history": list(d.history),
         **({"internal": list(d.internal)} if d.internal else {}),
+        **({"term_groups": [list(g) for g in d.term_groups]} if d.term_groups else {}),
         **({"functions": list(d.functions)} if d.functions else {}),
         **({"cell": d.cell} if d.cell else {}),
         **({"arrays": {a.name: _array(a) for a in d.arrays}} if d.arrays else {}),

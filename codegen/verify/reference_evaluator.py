@@ -224,6 +224,8 @@ class Evaluation:
                 return self._solve(s, row, q)
             case "slope":
                 return self._slope(s, q)
+            case "terms":
+                return self._terms(s, row, q)
             case "of array":
                 layout, number = s.content
                 amount, *args = (row[a] for a in s.args)
@@ -268,6 +270,23 @@ class Evaluation:
             pairs = zip(modes, unknowns, strict=True)
             return sum(number(b[index]) * p for b, p in pairs)
         return self.arrays[array][index]
+
+    def _terms(self, s: Step, row: Row, q: int) -> Number:
+        """Reduction over the terms of run-time arrays."""
+        entries, value, kind, numbers = s.content
+        columns = [
+            [v + row[a] * w if row[a] else v for v, w in self.moving[k]]
+            for k, a in zip(numbers, s.args, strict=True)
+        ]
+        terms = [self._with(s, q, entries, list(t), value)[0] for t in zip(*columns, strict=True)]
+        if None in terms:
+            raise NotRealError
+        n = self.evaluator.arithmetic
+        if kind == "sum":
+            return n.sum(s.slot, len(terms))(*terms)
+        if kind == "product":
+            return n.product(s.slot, len(terms))(*terms)
+        return (min if kind == "minimum" else max)(terms)
 
     def _integral(self, s: Step) -> Number:
         n = self.evaluator.arithmetic

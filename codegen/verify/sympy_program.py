@@ -28,6 +28,7 @@ from softehl.codegen.language.sympy_tape import (
     Result,
     Slope,
     SympyTape,
+    Terms,
 )
 
 ARRAYS = ("coordinates", "dofs", "data", "parameters", "arrays")
@@ -163,6 +164,8 @@ class _Builder:
                 parts = (*meaning.unknowns, *meaning.equations, *meaning.start)
             case Principal():
                 parts = (*meaning.squares, meaning.energy, *meaning.entries)
+            case Terms():
+                parts = (*meaning.entries, sp.sympify(meaning.value), *meaning.amounts)
             case OfArray():
                 parts = (meaning.amount, *meaning.args)
             case External():
@@ -216,6 +219,12 @@ class _Builder:
                 return self._add(
                     "stretches", self._at(*m.entries), (squares, energy[0]), inner=inner
                 )
+            case Terms():
+                entries, (value,) = self._at(*m.entries), self._at(m.value)
+                numbers = tuple(self.record.inputs[a][1] for a in m.amounts)
+                inner = self._between(entries, (value,))
+                content = (entries, (value,), m.kind, numbers)
+                return self._add("terms", self._at(*m.amounts), content, inner=inner)
             case OfArray():
                 number = self.record.inputs[m.amount][1]
                 return self._add("of array", self._at(m.amount, *m.args), (m.layout, number))
@@ -303,8 +312,8 @@ class _Builder:
         slot = len(self.steps)
         local_unknowns: set[int] = {slot} if name == "local" else set()
         below = [self.steps[a] for a in args]
-        if name in ("solve", "stretches", "isotropic"):
-            unknowns, results = content
+        if name in ("solve", "stretches", "isotropic", "terms"):
+            unknowns, results = content[:2]
             below += [self.steps[k] for s in inner for k in s.args if k not in unknowns]
             below += [self.steps[k] for k in ((results,) if name == "stretches" else results)]
             hidden = set(unknowns)
@@ -338,7 +347,7 @@ def _needed(steps: Sequence[Step], roots: Iterable[int], stop: Iterable[int] = (
             needed.add(slot)
             s = steps[slot]
             waiting += s.args
-            if s.name in ("solve", "isotropic"):
+            if s.name in ("solve", "isotropic", "terms"):
                 waiting += s.content[1]
             elif s.name == "stretches":
                 waiting.append(s.content[1])

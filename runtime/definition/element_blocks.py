@@ -23,7 +23,12 @@ from softehl.runtime.discretisation.dofmap import Slot, slots
 from softehl.runtime.kernels.array_data import data_of
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.kernels.kernel_call import ArgumentError, Rule, address_of
-from softehl.runtime.kernels.run_time_arrays import ArrayData, ArrayDataError, RunTimeArray
+from softehl.runtime.kernels.run_time_arrays import (
+    ArrayData,
+    ArrayDataError,
+    RunTimeArray,
+    require_equal_lengths,
+)
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.interior_facets import cells_at_side, interior
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
@@ -184,8 +189,18 @@ def page_on(
             for p in kernel.parameters
             if p in arguments
         },
-        arrays={a.name: _array_data(name, a, arguments[a.name]) for a in kernel.arrays},
+        arrays=_arrays(name, kernel, arguments),
     )
+
+
+def _arrays(block: str, kernel: Kernel, arguments: Mapping[str, Any]) -> dict[str, ArrayData]:
+    """Data of all run-time arrays of a kernel.  Raises StudyError."""
+    arrays = {a.name: _array_data(block, a, arguments[a.name]) for a in kernel.arrays}
+    try:
+        require_equal_lengths(kernel.term_groups, arrays)
+    except ArrayDataError as error:
+        raise StudyError(f"{block!r}: {error}") from None
+    return arrays
 
 
 def _array_data(block: str, array: RunTimeArray, given: object) -> ArrayData:

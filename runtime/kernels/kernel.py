@@ -429,6 +429,7 @@ def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
         history=tuple(entry.get("history", ())),
         internal=tuple(entry.get("internal", ())),
         functions=tuple(entry.get("functions", ())),
+        term_groups=tuple(map(tuple, entry.get("term_groups", ()))),
         cell=entry.get("cell", ""),
         kept=entry.get("kept", 0),
         arrays=tuple(_array(n, a) for n, a in entry.get("arrays", {}).items()),

@@ -21,6 +21,7 @@ from softehl.runtime.kernels.run_time_arrays import (
     RunTimeArray,
     is_packed,
     packed,
+    require_equal_lengths,
 )
 from softehl.runtime.kernels.shared_library import KernelError, Library
 
@@ -145,19 +146,24 @@ class Family:
     cell: str = ""
     kept: int = 0
     arrays: tuple[RunTimeArray, ...] = ()
+    term_groups: tuple[tuple[str, ...], ...] = ()
 
     def with_arrays(self, parameters: Sequence[float] | Array, given: Mapping[str, Any]) -> Array:
         """Parameters as C reads them: numbers, then the arrays that `given` has by name.
 
         Raises ArgumentError.
         """
-        parts = []
+        data = {}
         for array in self.arrays:
             try:
-                parts.append(data_of(array, given[array.name]).numbers)
+                data[array.name] = data_of(array, given[array.name])
             except ArrayDataError as error:
                 raise ArgumentError(f"{self.name}: {array.name}: {error}") from None
-        return packed(parameters, parts)
+        try:
+            require_equal_lengths(self.term_groups, data)
+        except ArrayDataError as error:
+            raise ArgumentError(f"{self.name}: {error}") from None
+        return packed(parameters, [a.numbers for a in data.values()])
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,6 +59,15 @@ class RunTimeArray:
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
+def require_equal_lengths(groups: Sequence[Sequence[str]], arrays: Mapping[str, ArrayData]) -> None:
+    """Raise `ArrayDataError` where arrays of terms of one sum have different lengths."""
+    for group in groups:
+        lengths = {name: len(arrays[name].numbers) for name in group}
+        if len(set(lengths.values())) > 1:
+            told = ", ".join(f"{name} has {count}" for name, count in lengths.items())
+            raise ArrayDataError(f"{told} terms: arrays of one sum have equal lengths")
+
+
 def packed(
     parameters: Sequence[float] | Array,
     arrays: Sequence[Array],

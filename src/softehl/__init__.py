@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from softehl.codegen.language.fields import Fields
     from softehl.codegen.language.material import Law, Material, material
     from softehl.codegen.language.model import Model
+    from softehl.codegen.language.run_time_terms import TermArray
     from softehl.codegen.language.weak_form import Page, page
     from softehl.codegen.tools.cache_dir import CacheError
     from softehl.codegen.tools.model_text import ModelFileError
@@ -204,6 +205,7 @@ _MODELLING = {
     "Page": "softehl.codegen.language.weak_form",
     "QuadratureRule": "softehl.codegen.elements.quadrature",
     "TargetError": "softehl.codegen.abi",
+    "TermArray": "softehl.codegen.language.run_time_terms",
     "element": "softehl.codegen.elements.cells",
     "kinematics": "softehl.codegen.language.kinematics:",
     "material": "softehl.codegen.language.material",
@@ -300,6 +302,7 @@ __all__ = [
     "System",
     "Table",
     "TargetError",
+    "TermArray",
     "UnknownNameError",
     "UnstableState",
     "element",

@@ -28,6 +28,7 @@ CALLS: dict[str, tuple[list[float], list[float], dict[str, Any]]] = {
         {"parameters": [2.0, 0.7, 0.5], "point_data": np.array([[0.02]])},
     ),
     "condensed": ([0.0, 2.0], [0.0, 0.3], {"parameters": [2.0]}),
+    "fibres": ([], [0.3], {"parameters": {"k": [3.0, 1.0, 2.0], "crimp": [0.0, 0.1, 0.4]}}),
     "damaged_spring": ([], [0.7], {"parameters": [1.3]}),
     "ogden": (SQUARE, MOVED, {"parameters": [1.0, 1.7]}),
 }

@@ -19,6 +19,7 @@ from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import build, output_files
 from softehl.codegen.verify.graph_oracle import Oracle
+from softehl.runtime.kernels.array_data import data_of
 from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
 Number = Any
@@ -128,8 +129,9 @@ def element_state(kernel: Kernel, coordinates: Any, dofs: Any, **given: Any) -> 
     """One element's arguments for the oracle, from those of the kernel's methods."""
     rule = given.get("rule") or kernel.default_rule
     table = np.column_stack([rule.points.reshape(len(rule.weights), -1), rule.weights])
-    parameters = given.get("parameters", ())
+    parameters, arrays = given.get("parameters", ()), list[list[float]]()
     if isinstance(parameters, Mapping):
+        arrays = [data_of(a, parameters[a.name]).numbers.tolist() for a in kernel.arrays]
         parameters = [parameters[p] for p in kernel.parameters]
     return State(
         np.ravel(coordinates).tolist(),
@@ -139,6 +141,7 @@ def element_state(kernel: Kernel, coordinates: Any, dofs: Any, **given: Any) -> 
         table.tolist(),
         () if rule.basis is None else rule.basis.tolist(),
         np.asarray(given.get("point_data", ())).tolist(),
+        arrays,
     )
 
 
