@@ -21,16 +21,12 @@ def umat(law: Law, states: StatesOf) -> dict[str, str]:
     more, settings = shared.tests(r, states)
     substitutions = {
         **shared.substitutions(r, "*noel"),
-        "moduli": _moduli(r),
+        "moduli": shared.modulus_table(r),
         "deformation": _deformation(r),
     }
-    substitutions["density"] = (
-        "fields[0]" if r.measure is Measure.SMALL else f"fields[0] / {_VOLUME}"
-    )
+    substitutions["density"] = shared.energy_density(r)
     texts["umat.c"] = c_interface.filled(c_interface.template("umat.c"), substitutions)
-    texts["element.f90"] = c_interface.filled(
-        c_interface.template("umat_element.f90"), substitutions
-    )
+    texts["element.f90"] = shared.cauchy_element("umat_call.f90", "UMAT", substitutions)
     texts["Makefile"] = c_interface.filled(
         c_interface.template("abaqus.mk"),
         {**substitutions, "kind": "umat", "host": "tetrahedron.f90 element.f90 host.f90"},
@@ -41,16 +37,6 @@ def umat(law: Law, states: StatesOf) -> dict[str, str]:
 
 
 ABAQUS = Host(element=uel, material=umat)
-
-_VOLUME = (
-    "(u[0] * (u[4] * u[8] - u[5] * u[7]) - u[1] * (u[3] * u[8] - u[5] * u[6])\n"
-    "        + u[2] * (u[3] * u[7] - u[4] * u[6]))"
-)
-
-
-def _moduli(r: Response) -> str:
-    rows = [", ".join(str(r.modulus(i, j)) for j in range(6)) for i in range(6)]
-    return "\n".join(f"    {{{row}}}," for row in rows)
 
 
 def _deformation(r: Response) -> str:

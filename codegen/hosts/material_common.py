@@ -6,7 +6,7 @@ modulus as the program does; it must give the forces and the stiffness of the la
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from softehl.codegen.abi import Task
@@ -64,6 +64,28 @@ def _history(interface: ElementInterface) -> Iterable[str]:
     for k, field in enumerate(interface.renewed):
         value = f"data[{k}]" if field is None else f"fields[{field}]"
         yield f"    after[{k}] = {value};\n"
+
+
+def modulus_table(r: Response, order: Sequence[int] = range(6)) -> str:
+    """Rows of a C table: field of each modulus; order: our component for each of the host's."""
+    rows = [", ".join(str(r.modulus(i, j)) for j in order) for i in order]
+    return "\n".join(f"    {{{row}}}," for row in rows)
+
+
+def energy_density(r: Response) -> str:
+    """C expression of the energy per current volume."""
+    if r.measure is Measure.SMALL:
+        return "fields[0]"
+    return (
+        "fields[0] / (u[0] * (u[4] * u[8] - u[5] * u[7]) - u[1] * (u[3] * u[8] - u[5] * u[6])\n"
+        "        + u[2] * (u[3] * u[7] - u[4] * u[6]))"
+    )
+
+
+def cauchy_element(call: str, host_name: str, values: Mapping[str, object]) -> str:
+    """Cell of the small host for Cauchy stress; call: template with the host's call."""
+    text = c_interface.template(call) + c_interface.template("cauchy_element.f90")
+    return c_interface.filled(text, {**values, "host_name": host_name})
 
 
 def depvar(r: Response) -> list[str]:

@@ -32,6 +32,7 @@ BUILT_IN = {
     "feap": "softehl.codegen.hosts.feap:FEAP",
     "abaqus": "softehl.codegen.hosts.abaqus_material:ABAQUS",
     "calculix": "softehl.codegen.hosts.calculix:CALCULIX",
+    "ansys": "softehl.codegen.hosts.ansys:ANSYS",
     "jax": "softehl.codegen.hosts.jax:JAX",
     "ngsolve": "softehl.codegen.hosts.ngsolve:NGSOLVE",
     "ufcx": "softehl.codegen.hosts.dolfinx:DOLFINX",

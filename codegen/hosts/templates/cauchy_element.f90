@@ -1,9 +1,11 @@
-! A tetrahedron of 4 nodes that asks UMAT for stress and modulus, as Abaqus integrates a material.
+! A tetrahedron of 4 nodes that asks @host_name@ for stress and modulus and integrates them.
+! Stress: Cauchy; modulus: of Jaumann's rate of the Kirchhoff stress, over the volume ratio.
 ! Its interface is that of UEL, so that the small host can test and solve with it.
 subroutine uel(rhs, amatrx, svars, energy, ndofel, nrhs, nsvars, props, nprops, coords, mcrd, &
     nnode, u, du, v, a, jtype, time, dtime, kstep, kinc, jelem, params, ndload, jdltyp, adlmag, &
     predef, npredf, lflags, mlvarx, ddlmag, mdload, pnewdt, jprops, njprop, period)
   use tetrahedron
+  use material_call
   implicit none
   logical, parameter :: small = @small@
   integer :: ndofel, nrhs, nsvars, nprops, mcrd, nnode, jtype, kstep, kinc, jelem, ndload
@@ -72,20 +74,5 @@ contains
     real(real8) :: c(3, 3)
     call cofactors(f, c, volume)
     g = matmul(c, g) / volume
-  end subroutine
-
-  ! The call of UMAT.
-  subroutine material(strain, f, stress, modulus, props, nprops, statev, nstatv, time, dtime, pnewdt)
-    integer, intent(in) :: nprops, nstatv
-    real(real8), intent(in) :: strain(6), f(3, 3), props(nprops), time(2), dtime
-    real(real8), intent(out) :: stress(6), modulus(6, 6)
-    real(real8), intent(inout) :: pnewdt, statev(nstatv)
-    real(real8) :: none(9), one(3, 3), before(6)
-    character(80) :: name
-    external :: umat
-    none = 0; one = 0; before = 0; stress = 0; modulus = 7; name = '@NAME@'
-    call umat(stress, statev, modulus, none(1), none(2), none(3), none(4), none, none, none(5), &
-      before, strain, time, dtime, 0d0, 0d0, none, none, name, 3, 3, 6, nstatv, props, nprops, none, &
-      one, pnewdt, 1d0, one, f, 1, 1, 1, 1, 1, 1)
   end subroutine
 end subroutine
