@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -18,6 +19,7 @@ from softehl.runtime.definition.problem_definition import ProblemDefinition, Stu
 from softehl.runtime.discretisation.loads import Tie
 from softehl.runtime.equations.rigid_body_modes import require_supported
 from softehl.runtime.equations.system import System
+from softehl.runtime.results.plotting import plot_path
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.arclength import Arclength
 from softehl.runtime.solve.continuation import StepRule
@@ -54,6 +56,33 @@ class LoadPath:
             f"{' to '.join(f'{t:.6g}' for t in bounds)}; {len(self.limits)} limits, "
             f"{len(self.bifurcations)} bifurcations>"
         )
+
+    def plot(self, name: str, at: Sequence[float], *, file: str | Path | None = None) -> None:
+        """Show the load factor over an unknown, with the limit points, or write it to a file.
+
+        Parameters
+        ----------
+        name : str
+            Unknown.
+        at : sequence of float
+            Place of a node.
+        file : str or Path, optional
+            Picture to write, such as "path.png"; left out, it is shown.
+
+        Raises
+        ------
+        StudyError
+            The path has no results.
+        MeshError
+            There is no node.
+        UnknownNameError
+            There is no such unknown; a KeyError.
+        PictureError
+            The file has another ending.
+        MissingPyvista
+            PyVista is not installed.
+        """
+        plot_path(self.results, self.limits, name, at, file)
 
 
 def follow(

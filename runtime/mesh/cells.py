@@ -315,6 +315,21 @@ def for_vtk(kind: str, nodes: Integers) -> Integers:
     return nodes[:, list(CELLS[kind].mirrored)] if CELLS[kind].vtk_mirrored else nodes
 
 
+def linear_pieces(kind: str, nodes: Integers) -> tuple[str, Integers]:
+    """Kind by meshio and nodes of cells in a file; linear pieces of those of order 3 and more."""
+    cell = CELLS[kind]
+    if cell.exponents:
+        return cell.meshio, for_vtk(kind, nodes)
+    linear = CELLS[{1: "line2", 2: "quad4", 3: "hex8"}[cell.dimension]]
+    rank = np.argsort(np.argsort(cell.line))[cell.lines]
+    at = np.empty((cell.order + 1,) * cell.dimension, dtype=np.int64)
+    at[tuple(rank.T)] = np.arange(len(nodes[0]))
+    steps = np.moveaxis(np.indices((cell.order,) * cell.dimension), 0, -1)
+    corners = steps.reshape(-1, 1, cell.dimension) + (linear.nodes > 0.0)
+    local = at[tuple(np.moveaxis(corners, -1, 0))]
+    return linear.meshio, nodes[:, local].reshape(-1, len(linear.nodes))
+
+
 def jacobians(cell: Cell, node_points: Array, at: Array) -> Array:
     """Determinants (n, q) of the map of cells with nodes at `places` (n, k, dim) at parent points.
 

@@ -341,6 +341,32 @@ class Mesh:
         else:
             write_parts(self, Path(path), parts)
 
+    def plot(
+        self, *, groups: bool = False, edges: bool = True, file: str | Path | None = None
+    ) -> None:
+        """Show a picture of the mesh, or write it to a file.
+
+        Parameters
+        ----------
+        groups : bool
+            Colour the cells by their first group.
+        edges : bool
+            Draw the edges of the cells.
+        file : str or Path, optional
+            Picture to write, such as "mesh.png" or "mesh.svg"; left out, it is shown in a window,
+            or in a notebook interactively.
+
+        Raises
+        ------
+        PictureError
+            The file has another ending, or there are no groups.
+        MissingPyvista
+            PyVista is not installed.
+        """
+        from softehl.runtime.mesh.plotting import plot_mesh
+
+        plot_mesh(self, groups=groups, edges=edges, file=file)
+
     # another one from it ------------------------------------------------------------------------
 
     def map(self, move: Callable[[Array], Array]) -> Mesh:

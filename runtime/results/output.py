@@ -13,7 +13,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import Block
 from softehl.runtime.discretisation.dofmap import AXES
 from softehl.runtime.io import replacing, write_text
-from softehl.runtime.mesh.cells import CELLS, for_vtk
+from softehl.runtime.mesh.cells import linear_pieces
 from softehl.runtime.mesh.readers.meshio import import_meshio
 
 
@@ -64,7 +64,7 @@ class VtuFields:
     def write(self, path: Path) -> None:
         """Write .vtu, atomically."""
         meshio = import_meshio()
-        small = {kind: _small(kind, nodes) for kind, nodes in self.cells.items()}
+        small = {kind: linear_pieces(kind, nodes) for kind, nodes in self.cells.items()}
         vtu_mesh = meshio.Mesh(
             np.pad(self.points, ((0, 0), (0, 3 - self.points.shape[1]))),
             list(small.values()),
@@ -96,21 +96,6 @@ class VtuFields:
             "</VTKFile>",
         ]
         write_text(path, "\n".join(lines) + "\n")
-
-
-def _small(kind: str, nodes: Integers) -> tuple[str, Integers]:
-    """Cells for a file; those of order 3 and more as linear ones between their nodes."""
-    cell = CELLS[kind]
-    if cell.exponents:
-        return cell.meshio, for_vtk(kind, nodes)
-    linear = CELLS[{1: "line2", 2: "quad4", 3: "hex8"}[cell.dimension]]
-    rank = np.argsort(np.argsort(cell.line))[cell.lines]
-    at = np.empty((cell.order + 1,) * cell.dimension, dtype=np.int64)
-    at[tuple(rank.T)] = np.arange(len(nodes[0]))
-    steps = np.moveaxis(np.indices((cell.order,) * cell.dimension), 0, -1)
-    corners = steps.reshape(-1, 1, cell.dimension) + (linear.nodes > 0.0)
-    local = at[tuple(np.moveaxis(corners, -1, 0))]
-    return linear.meshio, nodes[:, local].reshape(-1, len(linear.nodes))
 
 
 def piece_names(path: Path, count: int) -> list[str]:

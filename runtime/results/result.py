@@ -28,8 +28,10 @@ from softehl.runtime.equations.stability import negative_directions
 from softehl.runtime.kernels.explanation import Explanation
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError, place_text
+from softehl.runtime.mesh.plotting import picture_file, show_or_save
 from softehl.runtime.results.explanation import explain_element
 from softehl.runtime.results.output import VtuFields, piece_names
+from softehl.runtime.results.plotting import picture_of
 from softehl.runtime.results.recovery import nodal_operator, recover_block
 from softehl.runtime.sensitivity.input_parsing import By, inputs
 from softehl.runtime.sensitivity.inputs import Input, Key
@@ -589,6 +591,60 @@ class Result:
         """
         displacements = np.stack([np.nan_to_num(self.values(name)) for name in names], axis=1)
         return np.asarray(self.system.mesh.points + displacements)
+
+    def plot(
+        self,
+        name: str | None = None,
+        *,
+        block: str | None = None,
+        deformed: bool | float = False,
+        recovery: str = "projection",
+        limits: tuple[float, float] | None = None,
+        edges: bool = True,
+        file: str | Path | None = None,
+    ) -> None:
+        """Show a picture of the body, or write it to a file.
+
+        Parameters
+        ----------
+        name : str, optional
+            Unknown ("u_y"), vector ("u": its length), field of the page ("sigma_xx"), or
+            "von_mises" of the fields sigma_xx, ...; left out, the mesh alone.
+        block : str, optional
+            Block of the field; all blocks if left out, with means at common nodes.
+        deformed : bool or float
+            Displace nodes by u_x, u_y, u_z; a number is the factor of the displacements.
+        recovery : str
+            As of `at_nodes`.
+        limits : tuple of float, optional
+            Least and largest value of the colours.
+        edges : bool
+            Draw the edges of the cells.
+        file : str or Path, optional
+            Picture to write, such as "u.png" or "u.svg"; left out, it is shown in a window, or in
+            a notebook interactively.
+
+        Raises
+        ------
+        StudyError
+            There is no such unknown or field, or the mesh is distributed.
+        PictureError
+            The file has another ending.
+        MissingPyvista
+            PyVista is not installed.
+        """
+        if file is not None:
+            picture_file(file)
+        picture = picture_of(
+            self,
+            name,
+            block=block,
+            deformed=deformed,
+            recovery=recovery,
+            limits=limits,
+            edges=edges,
+        )
+        show_or_save(picture.draw(off_screen=file is not None), file)
 
     def write(self, path: str | Path) -> None:
         """Write the mesh with unknowns and fields to a file for ParaView.

@@ -82,9 +82,11 @@ if TYPE_CHECKING:
     from softehl.runtime.kernels.shared_library import KernelError
     from softehl.runtime.kernels.tables import Table
     from softehl.runtime.mesh.mesh import Mesh, MeshError
+    from softehl.runtime.mesh.plotting import MissingPyvista, PictureError
     from softehl.runtime.mpi import MissingPetsc
     from softehl.runtime.parallel.matrix_free import MatrixFree
     from softehl.runtime.parallel.petsc import Petsc
+    from softehl.runtime.results.plotting import animate
     from softehl.runtime.results.result import Modes, ModeShape, Result
     from softehl.runtime.results.tensors import principal_values, von_mises
     from softehl.runtime.solve.arclength import Arclength
@@ -146,6 +148,7 @@ _PUBLIC = {
     "MissedBifurcations": "softehl.runtime.analyses.bifurcation",
     "MissingBackend": "softehl.runtime.solve.linear.direct",
     "MissingPetsc": "softehl.runtime.mpi",
+    "MissingPyvista": "softehl.runtime.mesh.plotting",
     "ModeShape": "softehl.runtime.results.result",
     "Modes": "softehl.runtime.results.result",
     "Motion": "softehl.runtime.analyses.motion",
@@ -160,6 +163,7 @@ _PUBLIC = {
     "Outcome": "softehl.cases.harness.observer",
     "Parameters": "softehl.cases.harness.parameters",
     "Petsc": "softehl.runtime.parallel.petsc",
+    "PictureError": "softehl.runtime.mesh.plotting",
     "Point": "softehl.runtime.solve.solution",
     "Problem": "softehl.runtime.discretisation.problem",
     "ProblemError": "softehl.runtime.discretisation.problem_checks",
@@ -179,6 +183,7 @@ _PUBLIC = {
     "System": "softehl.runtime.equations.system",
     "Table": "softehl.runtime.kernels.tables",
     "UnstableState": "softehl.runtime.equations.stability",
+    "animate": "softehl.runtime.results.plotting",
     "initial_weights": "softehl.runtime.kernels.networks",
     "main": "softehl.__main__",
     "principal_values": "softehl.runtime.results.tensors",
@@ -260,6 +265,7 @@ __all__ = [
     "MissedBifurcations",
     "MissingBackend",
     "MissingPetsc",
+    "MissingPyvista",
     "ModeShape",
     "Model",
     "ModelError",
@@ -280,6 +286,7 @@ __all__ = [
     "Page",
     "Parameters",
     "Petsc",
+    "PictureError",
     "Point",
     "Problem",
     "ProblemError",
@@ -305,6 +312,7 @@ __all__ = [
     "TermArray",
     "UnknownNameError",
     "UnstableState",
+    "animate",
     "element",
     "initial_weights",
     "kinematics",

@@ -20,6 +20,7 @@ OPTIONAL = {
     **dict.fromkeys(("bokeh", "jinja2", "openpyxl"), "report"),
     **dict.fromkeys(("panel", "panel_material_ui", "pandas", "tornado"), "app"),
     "pyamg": "amg",
+    "pyvista": "plot",
 }
 DISTRIBUTION = {"PIL": "pillow"}
 BROUGHT = {
@@ -67,7 +68,7 @@ def test_deriving_needs_one_extra_more() -> None:
 
 def test_there_is_an_extra_for_each_purpose() -> None:
     wanted = {"amg", "benchmarks", "cad", "cluster", "dev", "docs", "fast", "generate", "mpi"}
-    wanted |= {"app", "hosts", "report"}
+    wanted |= {"app", "hosts", "plot", "report"}
     assert set(PROJECT["optional-dependencies"]) == wanted
 
 
