@@ -196,7 +196,7 @@ def plot_path(
     if not results:
         raise StudyError("plot: the path has no results")
     system = results[0].system.everywhere
-    node = system.mesh.node_at(at)
+    node = system.mesh.node_at(np.asarray(at, dtype=np.float64))
     values = np.array([r.values(name)[node] for r in results])
     pyvista = import_pyvista()
     chart = pyvista.Chart2D(x_label=f"{name} at {tuple(at)}", y_label="load factor")

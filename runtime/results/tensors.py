@@ -62,7 +62,7 @@ def principal_values(fields: Mapping[str, Array | float], name: str = "sigma") -
     """
     xx, yy, zz, xy, yz, xz = _components(fields, name)
     rows = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1)
-    defined = np.isfinite(rows).all(axis=-1)
+    defined = np.asarray(np.isfinite(rows).all(axis=-1))
     matrices = np.where(defined[..., None], rows, 0.0).reshape(*xx.shape, 3, 3)
     values = np.where(defined[..., None], np.linalg.eigvalsh(matrices), np.nan)
     return np.asarray(np.moveaxis(values[..., ::-1], -1, 0))
