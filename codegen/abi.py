@@ -29,6 +29,8 @@ not overlap.  Units are those of the model's model (mm, MPa, N, s in the shipped
 |               | ndata + nparameters  | `fields_rate` follow: of its coordinates, its data (not  |
 |               | (+ ndof)             | those of points), the parameters and, in the second, its |
 |               |                      | dofs                                                     |
+|               | n, the same with     | of the tasks `adjoint_rate` and `point_adjoint_rate`: a  |
+|               | dofs, 2 ndof         | variation, then the adjoint of each dof and its rate     |
 | `rule`        | points, dimension + 1| parent coordinates of each point, then its weight        |
 | `basis`       | points, modes,       | value and xi-derivative of the interpolating shapes, one |
 |               | components           | pair for each interpolated field (2 components a field)  |
@@ -48,6 +50,13 @@ not overlap.  Units are those of the model's model (mm, MPa, N, s in the shipped
 | `fields`      | n, points, nfields: values at the quadrature points        |
 | `fields_rate` | n, points, nfields: derivative of the fields along a       |
 |               | variation of all that they depend on                       |
+| `adjoint_rate`| n, ncoordinates + ndata + nparameters + ndof: rates, along |
+|               | a variation, of the derivatives of L by each of these. L is|
+|               | the adjoint times the residual, plus the sum over points of|
+|               | adjoint times history after the step                       |
+| `point_`      | n, points, npoint / 4: the same of the derivatives of L by |
+| `adjoint_rate`| the data of points. Their data are those of the page, the  |
+|               | rates, the adjoints of the history and the rates of these  |
 
 Run-time arrays (`Definition.arrays`: curves, weights of networks) are the same for all elements of
 a call, and stand in `parameters` behind the constants: first three numbers for each, its place in
@@ -116,13 +125,17 @@ class Task(StrEnum):
     PRODUCT = "product"
     PSEUDO_LOAD = "pseudo_load"
     FIELDS_RATE = "fields_rate"
+    ADJOINT_RATE = "adjoint_rate"
+    POINT_ADJOINT_RATE = "point_adjoint_rate"
 
 
-AT_POINTS = (Task.FIELDS, Task.FIELDS_RATE)
+ADJOINT = (Task.ADJOINT_RATE, Task.POINT_ADJOINT_RATE)
+"""Tasks of second derivatives of results."""
+AT_POINTS = (Task.FIELDS, Task.FIELDS_RATE, Task.POINT_ADJOINT_RATE)
 """Tasks whose values are those of the quadrature points."""
-DESIGN = (Task.PSEUDO_LOAD, Task.FIELDS_RATE)
+DESIGN = (Task.PSEUDO_LOAD, Task.FIELDS_RATE, *ADJOINT)
 """Tasks of sensitivities, which stand in a file of their own unless they share routines."""
-ROLLED = (*AT_POINTS, Task.PSEUDO_LOAD)
+ROLLED = (*AT_POINTS, Task.PSEUDO_LOAD, Task.ADJOINT_RATE)
 """Tasks whose loop over the points is never written out: they are called once a state."""
 
 

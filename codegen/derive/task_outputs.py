@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
-from softehl.codegen.abi import AT_POINTS, Task, derivative_task
+from softehl.codegen.abi import ADJOINT, AT_POINTS, Task, derivative_task
 from softehl.codegen.derive import invariant_chain_rule
 from softehl.codegen.derive.multilevel_chain_rule import Linearisation
 from softehl.codegen.derive.output_entries import Entry, Slot
 from softehl.codegen.derive.potential_structure import Structure, structure_of
 from softehl.codegen.graph.differentiation import directional, gradient
 from softehl.codegen.graph.graph import Input, Node
-from softehl.codegen.graph.guarded_products import Certain
+from softehl.codegen.graph.guarded_products import Certain, guarded, plus
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 
@@ -33,6 +33,8 @@ def tasks(d: Definition) -> list[str]:
     if d.tasks is not None:
         offered = [t for t in offered if t in d.tasks]
     optional = {Task.PSEUDO_LOAD: d.pseudo_load, Task.FIELDS_RATE: d.fields_rate}
+    optional[Task.ADJOINT_RATE] = d.adjoint_rate
+    optional[Task.POINT_ADJOINT_RATE] = d.adjoint_rate and bool(d.point_data)
     offered += [task for task, requested in optional.items() if requested]
     return offered + [derivative_task(name) for name, _ in d.derivatives]
 
@@ -52,12 +54,14 @@ def outputs(d: Definition, task: str) -> list[Entry]:
 
 def is_differentiated(task: str) -> bool:
     """False for what the model writes down itself, and for the rates of it."""
-    return task not in (Task.ENERGY, *AT_POINTS)
+    return task not in (Task.ENERGY, *AT_POINTS, *ADJOINT)
 
 
 def variants(d: Definition, task: str, structure: Structure | None) -> Iterator[Variant]:
     """The outputs of a task by different chain rules: passes will tell which is the cheapest."""
-    if task == Task.FIELDS_RATE:
+    if task in ADJOINT:
+        yield Variant("reverse, over forward, over reverse", _adjoint_rates(d, task))
+    elif task == Task.FIELDS_RATE:
         values = [Entry(Slot(False, k), None, n) for k, (_, n) in enumerate(d.fields)]
         yield Variant("along a variation", _rates(d, task, values))
     elif not is_differentiated(task):
@@ -119,6 +123,44 @@ def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
     return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
 
 
+def _adjoint_rates(d: Definition, task: str) -> list[Entry]:
+    """Rates of the derivatives of L = adjoint . residual + adjoints . history by all arguments.
+
+    The rate of L along a variation is one value, whose derivatives are taken in reverse. The
+    adjoints themselves move, too.
+    """
+    g, first = d.graph, d.coordinate_width + len(d.data) + len(d.parameters)
+    unknowns, count = d.directions, d.page_point_data
+    adjoint = gradient(g, d.potential, unknowns, constant=d.constant)
+    arguments = {n: rate for n, rate in argument_seeds(d).items() if _array(n) != "arrays"}
+    seeds = {**arguments, **unknown_seeds(d, first)}
+    lagrangian = g.zero
+    for k, u in enumerate(unknowns):
+        left, rate = (g.input("direction", first + s * len(unknowns) + k) for s in (1, 2))
+        seeds[left] = rate
+        lagrangian = plus(g, lagrangian, guarded(g, adjoint[u], left))
+    history, values = g.zero, dict(d.fields)
+    names = [a.name for a in d.point_data[:count]]
+    for name in d.history:
+        k = names.index(name)
+        left, rate = (g.input("point data", s * count + k, varying=True) for s in (2, 3))
+        seeds[left] = rate
+        history = plus(g, history, guarded(g, values[f"new_{name}"], left))
+    lagrangian = g.add(lagrangian, g.sum(history))
+    (along,) = directional(g, [lagrangian], seeds)
+    if task == Task.POINT_ADJOINT_RATE:
+        sources = [g.input("point data", k, varying=True) for k in range(count)]
+    else:
+        sources = [n for n in arguments if _array(n) != "point data"] + list(unknowns)
+    slopes = gradient(g, along, sources)
+    return [Entry(Slot(False, k), None, slopes[n]) for k, n in enumerate(sources)]
+
+
+def _array(n: Node) -> str:
+    assert isinstance(n.payload, Input)
+    return n.payload.array
+
+
 def unknown_seeds(d: Definition, first: int) -> dict[Node, Node]:
     """Unknowns that move along `direction`, where theirs begin at the entry `first`."""
     array = {"dofs": ("direction", first), "interpolated": ("interpolated direction", 0)}
@@ -142,10 +184,10 @@ def argument_seeds(d: Definition) -> dict[Node, Node]:
     inputs = ((array, k) for array, width in widths.items() for k in range(width))
     g = d.graph
     seeds = {g.input(*source): g.input("direction", n) for n, source in enumerate(inputs)}
-    half = len(d.point_data) // 2 if d.point_rates else 0
-    for k, varying in product(range(half), (False, True)):
+    count = d.page_point_data if d.point_rates else 0
+    for k, varying in product(range(count), (False, True)):
         value = g.input("point data", k, varying=varying)
-        seeds[value] = g.input("point data", half + k, varying=varying)
+        seeds[value] = g.input("point data", count + k, varying=varying)
     seeds |= {g.input("arrays", k): g.one for k in range(len(d.arrays))}
     return seeds
 

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from softehl.codegen import abi
-from softehl.codegen.emit.c_printer import data_expression, direction_expression, dofs_expression
+from softehl.codegen.emit.c_printer import (
+    data_expression,
+    design_width,
+    direction_expression,
+    dofs_expression,
+    point_width,
+)
 from softehl.codegen.language.definition import Definition
 
 WIDE = 256
@@ -15,7 +21,8 @@ def widths(d: Definition, task: str) -> dict[str, str]:
     size = dofs_expression(d)
     along = direction_expression(d, task) or "0"
     values = {abi.Task.ENERGY: "1"}
-    values |= dict.fromkeys(abi.AT_POINTS, f"({len(d.fields)} * points)")
+    values |= {t: f"({point_width(d, t)} * points)" for t in abi.AT_POINTS}
+    values[abi.Task.ADJOINT_RATE] = str(design_width(d) + len(d.unknowns))
     return {
         "coordinates": str(d.coordinate_width),
         "dofs": size,

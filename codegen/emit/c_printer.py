@@ -320,7 +320,14 @@ def direction_expression(d: Definition, task: str) -> str:
         return str(design_width(d))
     if task == abi.Task.FIELDS_RATE:
         return f"({design_width(d)} + {dofs_expression(d)})"
+    if task in abi.ADJOINT:
+        return str(design_width(d) + 3 * len(d.unknowns))
     return dofs_expression(d) if task == abi.Task.PRODUCT else ""
+
+
+def point_width(d: Definition, task: str) -> int:
+    """Values at a point of a task whose values are those of points."""
+    return d.page_point_data if task == abi.Task.POINT_ADJOINT_RATE else len(d.fields)
 
 
 def data_expression(d: Definition) -> str:

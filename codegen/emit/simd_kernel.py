@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from softehl.codegen import abi
 from softehl.codegen.derive.output_entries import Entry, Slot
 from softehl.codegen.emit.batch_functions import functions, widths
-from softehl.codegen.emit.c_printer import Printer, design_width, dofs_expression
+from softehl.codegen.emit.c_printer import Printer, design_width, dofs_expression, point_width
 from softehl.codegen.emit.code_motion import If, Loop, Same, Schedule, Statement, flat
 from softehl.codegen.emit.instruction_scheduling import ADDITIONS
 from softehl.codegen.emit.simd_printer import LanePrinter
@@ -144,6 +144,8 @@ class _Group:
         fixed["direction"] = along.get(self.task, 0)
         if self.task in (abi.Task.PRODUCT, abi.Task.FIELDS_RATE):
             fixed["direction"] += len(d.unknowns)
+        if self.task in abi.ADJOINT:
+            fixed["direction"] += 3 * len(d.unknowns)
         for array, count in fixed.items():
             self._load(1, _READ[array], count, self.widths[array], _READ[array])
         if not d.interpolated:
@@ -272,7 +274,7 @@ class _Group:
             else:
                 runs.append([x])
         for run in runs:
-            at = f"R + {len(self.p.d.fields)} * q + {run[0].row.position}"
+            at = f"R + {point_width(self.p.d, self.task)} * q + {run[0].row.position}"
             values = ", ".join(self.p.value(x.node) for x in run)
             self.p.line(2, f"softehl_store{len(run)}({at}, {self.widths['values']}, {values});")
 

@@ -280,7 +280,10 @@ class Isotropic(Routine):
 
     def partials(self, g: Graph, item: Node) -> Pairs:
         if self.order == 2:
-            raise DifferentiationError(f"{self.name}: no third derivatives by the stretches")
+            raise DifferentiationError(
+                f"{self.name}: a function of principal stretches has no third derivatives, write "
+                "it by invariants"
+            )
         args, k = item.args[0].args, result_index(item)
         raised = g.run(self._relative(self.energy, self.order + 1, self.name), args)
         by_C = raised if self.order == 0 else [raised[upper(k, i)] for i in range(6)]

@@ -128,6 +128,8 @@ class Definition:
         Name and value of each field.
     product, pseudo_load, fields_rate : bool
         Further tasks; see `Model.offer`.
+    adjoint_rate : bool
+        Whether the tasks are those of second derivatives of results, and no others.
     derivatives : tuple
         Arguments by which the residual is differentiated.
     example : tuple
@@ -185,6 +187,7 @@ class Definition:
     product: bool = False
     pseudo_load: bool = False
     fields_rate: bool = False
+    adjoint_rate: bool = False
     derivatives: tuple[tuple[str, Node], ...] = ()
     example: tuple[tuple[str, float], ...] = ()
     tasks: tuple[str, ...] | None = None
@@ -255,6 +258,37 @@ class Definition:
             point=self.point
             and replace(self.point, definition=self.point.definition.for_derivatives()),
         )
+
+    def for_second_derivatives(self) -> Definition:
+        """Return the model from which second derivatives of results are computed.
+
+        Returns
+        -------
+        Definition
+            With the task `adjoint_rate` and, if there are data of points, `point_adjoint_rate`. Its
+            point data are those of this model, their rates, the adjoints of the history after the
+            step, and the rates of these. Elements are compiled as a whole.
+        """
+        prefixes = ("", "rate_", "adjoint_", "rate_adjoint_")
+        return replace(
+            self,
+            point_data=tuple(
+                Argument(f"{p}{a.name}", f"{p}{a.name}") for p in prefixes for a in self.point_data
+            ),
+            point_rates=True,
+            product=False,
+            pseudo_load=False,
+            fields_rate=False,
+            adjoint_rate=True,
+            derivatives=(),
+            tasks=(),
+            point=None,
+        )
+
+    @property
+    def page_point_data(self) -> int:
+        """Number of data of a point that the page has, without their rates and adjoints."""
+        return len(self.point_data) // (4 if self.adjoint_rate else 2 if self.point_rates else 1)
 
 
 def functions_of_user(d: Definition) -> dict[Node, ExternalFunction]:

@@ -55,12 +55,12 @@ def folder_of(
     source: Path | Definition | Page | Law,
     where: CellKey = ((), "", False),
     *,
-    derivatives: bool = False,
+    derivatives: int = 0,
 ) -> Path:
     """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived).
 
-    where: cells and geometry of weak forms, and whether materials are wanted. derivatives:
-    the kernels of `Definition.for_derivatives` instead.
+    where: cells and geometry of weak forms, and whether materials are wanted. derivatives: 1 or 2
+    for the kernels of `Definition.for_derivatives` or `for_second_derivatives` instead.
     """
     folder = _folder_of(source, where, derivatives=derivatives)
     text = model_text.digest(model_text.sources(source)) if isinstance(source, Path) else ""
@@ -110,7 +110,7 @@ def _folder_of(
 ) -> Path:
     cells, geometry, materials = where
     if derivatives:
-        return _for_derivatives(source, where)
+        return _for_derivatives(source, where, derivatives)
     if not isinstance(source, Path):
         return library(_definitions(source, where)).folder
     sources = model_text.sources(source)
@@ -131,12 +131,12 @@ def _folder_of(
     return compiled(files)[0]
 
 
-def _for_derivatives(source: Path | Definition | Page | Law, where: CellKey) -> Path:
+def _for_derivatives(source: Path | Definition | Page | Law, where: CellKey, order: int) -> Path:
     """Folder of the kernels of what derivatives of results are made of."""
     cells, geometry, materials = where
     key, read = None, None
     if isinstance(source, Path):
-        options = [*cells, geometry, "materials" if materials else "", "derivatives"]
+        options = [*cells, geometry, "materials" if materials else "", f"derivatives {order}"]
         sources = model_text.sources(source)
         key = _file_key(sources, options)
         files = store.recall(key, source)
@@ -155,10 +155,16 @@ def _for_derivatives(source: Path | Definition | Page | Law, where: CellKey) -> 
     if not free:
         names = ", ".join(d.name for d in definitions)
         raise ModelFileError(f"{names}: gives derivatives of its own, and results have none by it")
-    return library([d.for_derivatives() for d in free], key, read).folder
+    return library([_differentiated(d, order) for d in free], key, read).folder
 
 
-def of_law(name: str, where: CellKey, *, derivatives: bool = False) -> Path:
+def _differentiated(d: Definition, order: int) -> Definition:
+    """The model from which derivatives of an order are computed, itself for 0."""
+    makers = (lambda: d, d.for_derivatives, d.for_second_derivatives)
+    return makers[order]()
+
+
+def of_law(name: str, where: CellKey, *, derivatives: int = 0) -> Path:
     """Folder of the kernels of a material that ships; raises ValueError for another name."""
     folder = _folder_of_law(name, where, derivatives=derivatives)
     _ORIGINS[folder] = Origin(name, where)
@@ -174,7 +180,7 @@ def _folder_of_law(name: str, where: CellKey, *, derivatives: bool) -> Path:
     from softehl.codegen.models.material_elements import law
 
     definitions = _definitions(law(name), where)
-    return library([d.for_derivatives() if derivatives else d for d in definitions], key).folder
+    return library([_differentiated(d, derivatives) for d in definitions], key).folder
 
 
 def _definitions(source: Definition | Page | Law, where: CellKey) -> list[Definition]:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from softehl.codegen import abi
+from softehl.codegen.emit.c_printer import design_width, point_width
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.graph.graph import Op
 from softehl.codegen.graph.traversal import reachable
@@ -48,8 +49,9 @@ class Batch:
 
     def prepared(self, task: str) -> tuple[Any, Any, Callable[[], None]]:
         """Width and array of values and of tangents, and the call that fills them."""
-        fields = self.points * len(self.d.fields)
-        width = {abi.Task.ENERGY: 1, **dict.fromkeys(abi.AT_POINTS, fields)}
+        width = {abi.Task.ENERGY: 1}
+        width |= {t: self.points * point_width(self.d, t) for t in abi.AT_POINTS}
+        width[abi.Task.ADJOINT_RATE] = design_width(self.d) + self.ndof
         wide = width.get(abi.Task(task), self.ndof) if task in set(abi.Task) else self.ndof
         square = self.ndof**2 if task == abi.Task.TANGENT else 0
         n = len(self.states)
@@ -64,14 +66,15 @@ class Batch:
 
     def direction(self, task: str, e: int) -> Vector:
         """Direction of a task in one element: its unknowns, or a random variation of all else."""
-        if task not in (abi.Task.PSEUDO_LOAD, abi.Task.FIELDS_RATE):
+        if task not in abi.DESIGN:
             return self.along[e]
         state = self.states[e]
         rng = random.Random(f"{self.d.name} variation {e}")
         sizes = [len(state.coordinates), len(state.data), len(state.parameters)]
         values = [*state.coordinates, *state.data, *state.parameters]
         varied = [rng.uniform(-1, 1) * abs(float(v)) for v in values[: sum(sizes)]]
-        return varied + (self.along[e] if task == abi.Task.FIELDS_RATE else [])
+        vectors = 3 if task in abi.ADJOINT else int(task == abi.Task.FIELDS_RATE)
+        return varied + vectors * self.along[e]
 
     def silent(self, task: str, *, first: bool = False) -> bool:
         """True if a model with routines gives not-a-number in a whole element: no local solution.

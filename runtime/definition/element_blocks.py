@@ -382,7 +382,11 @@ def add_block(
         elements = elements_of(definition.mesh, label, kernel, on, cells)
         block = page_on(definition.mesh, label, kernel, elements, form, arguments)
         require_apart(block, blocks.values())
-        blocks[label] = replace(block, differentiated=origin.differentiated(kernel))
+        blocks[label] = replace(
+            block,
+            differentiated=origin.differentiated(kernel),
+            twice_differentiated=origin.differentiated(kernel, 2),
+        )
 
 
 def _kernels(mesh: Mesh, origin: KernelOrigin, on: On, cells: str | None) -> list[Kernel]:

@@ -46,21 +46,25 @@ class KernelOrigin:
             self.source, self.model, cell=kind, geometry=self.geometry, materials=self.law
         )
 
-    def differentiated(self, kernel: Kernel) -> Callable[[], Kernel] | None:
-        """Return the maker of the kernel of derivatives of a page, which derives it when called."""
+    def differentiated(self, kernel: Kernel, order: int = 1) -> Callable[[], Kernel] | None:
+        """Return the maker of the kernel of derivatives of a page, which derives it when called.
+
+        order: of the derivatives of results, 1 or 2.
+        """
         if isinstance(self.source, Kernel) or is_folder(self.source):
             return None
-        if "pseudo_load" in kernel.tasks and not kernel.point_data:
+        if order == 1 and "pseudo_load" in kernel.tasks and not kernel.point_data:
             return None  # it comes with what is needed
-        return DerivativeKernel(self, kernel)
+        return DerivativeKernel(self, kernel, order)
 
 
 @dataclass(frozen=True, eq=False)
 class DerivativeKernel:
-    """Maker of the kernel of derivatives of the page that a kernel was made of."""
+    """Maker of the kernel of derivatives, of order 1 or 2, of the page of a kernel."""
 
     origin: KernelOrigin | None
     kernel: Kernel
+    order: int = 1
 
     def __call__(self) -> Kernel:
         """That kernel.  Raises StudyError where the page is another one meanwhile."""
@@ -70,10 +74,11 @@ class DerivativeKernel:
         """For `pickle`: a page that stands in no file stays behind."""
         origin = self.origin
         if origin is None or not isinstance(origin.source, str | Path):
-            return {"origin": None, "kernel": self.kernel}
+            return {"origin": None, "kernel": self.kernel, "order": self.order}
         in_file = str(origin.source).endswith(".py")
         source = Path(origin.source).absolute() if in_file else origin.source
-        return {"origin": replace(origin, source=source), "kernel": self.kernel}
+        origin = replace(origin, source=source)
+        return {"origin": origin, "kernel": self.kernel, "order": self.order}
 
     @cached_property
     def _kernel(self) -> Kernel:
@@ -87,9 +92,9 @@ class DerivativeKernel:
                 f"the page of {self.kernel.name} is another one than the study was made with, and "
                 "derivatives would be those of another model: make the study again"
             )
-        return self._loaded(self.origin, derivatives=True)
+        return self._loaded(self.origin, derivatives=self.order)
 
-    def _loaded(self, origin: KernelOrigin, *, derivatives: bool = False) -> Kernel:
+    def _loaded(self, origin: KernelOrigin, *, derivatives: int = 0) -> Kernel:
         kernel = self.kernel
         return page_loader.load_page(
             origin.source,

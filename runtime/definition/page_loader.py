@@ -19,7 +19,7 @@ class PageLoader(Protocol):
         cell: str | None = None,
         geometry: str | None = None,
         materials: bool = False,
-        derivatives: bool = False,
+        derivatives: int = 0,
     ) -> Kernel:
         """Return the kernel."""
         ...

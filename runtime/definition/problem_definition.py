@@ -61,7 +61,8 @@ class Block:
     before it is; rates, accelerations: likewise of what `rates` adds. initial: (n, points, k) point
     data at the start, or None.
     arrays: curves and weights of networks by name.
-    differentiated: makes the kernel of derivatives, or None where the page is C.
+    differentiated, twice_differentiated: make the kernels of first and of second derivatives, or
+    None where the page is C.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Block:
     parameters: Mapping[str, Number]
     arrays: Mapping[str, ArrayData] = field(default_factory=dict)
     differentiated: Callable[[], Kernel] | None = None
+    twice_differentiated: Callable[[], Kernel] | None = None
 
     @property
     def shared(self) -> frozenset[str]:

@@ -284,6 +284,71 @@ class Kernel(Family):
         )
         return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
 
+    def adjoint_rate(
+        self, coordinates: Array, dofs: Array, direction: Array, **kwargs: Any
+    ) -> Array:
+        """Return the rates, along a variation, of the derivatives of a Lagrangian.
+
+        Parameters
+        ----------
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        direction : array (n, coordinates + data + parameters + 3 ndof)
+            Variation of each of these and of the unknowns, adjoints of the unknowns, and the
+            variation of these.
+        **kwargs : array
+            Data and parameters; see the class. Data of points are those of the page, their
+            variation, adjoints of the history after the step, and the variation of these.
+
+        Returns
+        -------
+        array (n, coordinates + data + parameters + ndof)
+            Rates of the derivatives, by each of these, of adjoints times residual plus adjoints
+            times history after the step.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such task.
+        """
+        arguments = CallArguments(direction=direction, **kwargs)
+        call = Call(self, "adjoint_rate", coordinates, dofs, arguments)
+        design = direction.shape[1] - 2 * call.ndof
+        return call.run(np.empty((call.n, design)))
+
+    def point_adjoint_rate(
+        self, coordinates: Array, dofs: Array, direction: Array, **kwargs: Any
+    ) -> Array:
+        """Return the rates of `adjoint_rate`, of the derivatives by the data of points.
+
+        Parameters
+        ----------
+        coordinates : array (n, coordinates)
+            Nodal coordinates of the elements.
+        dofs : array (n, ndof)
+            Unknowns of the elements.
+        direction : array (n, coordinates + data + parameters + 3 ndof)
+            As of `adjoint_rate`.
+        **kwargs : array
+            As of `adjoint_rate`.
+
+        Returns
+        -------
+        array (n, points, data of points)
+            Rates of the derivatives by the data of points of the page.
+
+        Raises
+        ------
+        ArgumentError
+            An array has a wrong shape, or the kernel has no such task.
+        """
+        arguments = CallArguments(direction=direction, **kwargs)
+        call = Call(self, "point_adjoint_rate", coordinates, dofs, arguments)
+        count = len(self.point_data) // 4
+        return call.run(np.empty((call.n, len(call.rule.weights), count)))
+
     def fields_at(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Return the fields at the quadrature points.
 

@@ -222,7 +222,8 @@ class Call:
         if task == "product":
             return self.ndof
         design = width + len(self.kernel.data) + len(self.kernel.parameters)
-        return design + (self.ndof if task == "fields_rate" else 0)
+        vectors = {"fields_rate": 1, "adjoint_rate": 3, "point_adjoint_rate": 3}
+        return design + vectors.get(task, 0) * self.ndof
 
     def _rule(self, arguments: Rule | None) -> Rule:
         if arguments is None:

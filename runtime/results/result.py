@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -33,10 +33,11 @@ from softehl.runtime.results.explanation import explain_element
 from softehl.runtime.results.output import VtuFields, piece_names
 from softehl.runtime.results.plotting import picture_of
 from softehl.runtime.results.recovery import nodal_operator, recover_block
-from softehl.runtime.sensitivity.input_parsing import By, inputs
+from softehl.runtime.sensitivity.hessian import Term, hessian_by_key, hessian_products
+from softehl.runtime.sensitivity.input_parsing import By, components, inputs
 from softehl.runtime.sensitivity.inputs import Input, Key
-from softehl.runtime.sensitivity.jacobian import derivative, sensitivity
-from softehl.runtime.sensitivity.quantities import quantity
+from softehl.runtime.sensitivity.jacobian import by_key, derivative, sensitivity
+from softehl.runtime.sensitivity.quantities import UserFunction, quantity
 from softehl.runtime.sensitivity.tape import Tape
 from softehl.runtime.solve.solution import Point, Solution, Status
 from softehl.runtime.suggestions import did_you_mean, join_names, short_list
@@ -504,7 +505,7 @@ class Result:
 
     def sensitivity(
         self,
-        what: str | Callable[[Array], tuple[float, Array]],
+        what: str | UserFunction,
         *,
         by: By,
         at: tuple[float, ...] | None = None,
@@ -545,6 +546,97 @@ class Result:
         """
         tape, selected = self._differentiated(by)
         return sensitivity(tape, quantity(what, at, reaction), selected)
+
+    def hessian(
+        self,
+        what: str | UserFunction,
+        *,
+        by: By,
+        at: tuple[float, ...] | None = None,
+        reaction: str | None = None,
+    ) -> dict[tuple[Key, Key], float | Array]:
+        """Return the second derivatives of a quantity with respect to inputs.
+
+        Parameters
+        ----------
+        what : str or callable
+            As of `sensitivity`. A function of all unknowns returns its value, its gradient (n,) and
+            its Hessian (n, n): an array, a sparse matrix or a LinearOperator.
+        by : mapping of str to sequence of str
+            The inputs, as in `sensitivity`.
+        at : tuple of float, optional
+            As in `sensitivity`.
+        reaction : str, optional
+            As in `sensitivity`.
+
+        Returns
+        -------
+        dict of pairs of inputs to float or array
+            {(("rubber", "mu"), ("load:right", "u_y")): number, ...}, for all pairs. Arrays have an
+            axis for each input that has several components.
+
+        Raises
+        ------
+        StudyError
+            As of `sensitivity`, and for contact of bodies.
+        MeshError
+            The place lies outside the mesh.
+
+        Notes
+        -----
+        Adjoints of second order, through all steps of a path with history: two linear solutions a
+        step for each component of the inputs. For many components take `hessian_product`.
+        """
+        tape, selected = self._differentiated(by)
+        count = sum(len(item.value) for item in selected)
+        terms = [Term(tape, quantity(what, at, reaction))]
+        return hessian_by_key(hessian_products(terms, selected, np.eye(count)), selected)
+
+    def hessian_product(
+        self,
+        what: str | UserFunction,
+        *,
+        by: By,
+        direction: Mapping[Key, float | Array],
+        at: tuple[float, ...] | None = None,
+        reaction: str | None = None,
+    ) -> dict[Key, float | Array]:
+        """Return the second derivatives of a quantity times a direction of the inputs.
+
+        Parameters
+        ----------
+        what : str or callable
+            As of `hessian`.
+        by : mapping of str to sequence of str
+            The inputs, as in `sensitivity`.
+        direction : mapping of tuple to float or array
+            {("rubber", "mu"): number, ...}: how inputs of `by` move; others rest. An array has a
+            value for each component.
+        at : tuple of float, optional
+            As in `sensitivity`.
+        reaction : str, optional
+            As in `sensitivity`.
+
+        Returns
+        -------
+        dict of tuple to float or array
+            Rates of the derivatives of `sensitivity` along the direction.
+
+        Raises
+        ------
+        StudyError
+            As of `hessian`, and for a direction of another input or shape.
+        MeshError
+            The place lies outside the mesh.
+
+        Notes
+        -----
+        Two linear solutions a step, and one for the adjoint, for any number of components.
+        """
+        tape, selected = self._differentiated(by)
+        along = components(selected, direction)
+        terms = [Term(tape, quantity(what, at, reaction))]
+        return by_key(hessian_products(terms, selected, along[:, None])[:, 0], selected)
 
     def derivative(self, *, by: By) -> Array:
         """Return the derivatives of all unknowns with respect to inputs.

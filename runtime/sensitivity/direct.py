@@ -14,7 +14,7 @@ from softehl.runtime.sensitivity.tape import Tape, blocks_with_history, time_cou
 
 
 @dataclass(eq=False)
-class _DirectState:
+class DirectState:
     """Rates along one input after the steps so far, latest first: unknowns (n,), point data."""
 
     states: list[Array] = field(default_factory=list)
@@ -37,7 +37,7 @@ def along_path(chain: Sequence[Tape], inputs: Sequence[Input]) -> Iterator[Rates
     """Derivatives after each step of a chain by all components of the inputs."""
     seeds = [(k, j) for k, item in enumerate(inputs) for j in range(len(item.value))]
     sizes = [len(item.value) for item in inputs]
-    fronts = [_DirectState() for _ in seeds]
+    fronts = [DirectState() for _ in seeds]
     for tape in chain:
         step = LinearisedStep(tape)
         moves = [item.seeds(tape) for item in inputs]
@@ -45,16 +45,17 @@ def along_path(chain: Sequence[Tape], inputs: Sequence[Input]) -> Iterator[Rates
         for (k, j), state in zip(seeds, fronts, strict=True):
             seed = np.zeros(sizes[k])
             seed[j] = 1.0
-            rates.append(_step(step, moves[k], seed, state))
+            rates.append(tangent_step(step, moves[k], seed, state))
         unknowns, forces = (np.stack(part, axis=1) for part in zip(*rates, strict=True))
         yield Rates(tape, step, unknowns, forces)
 
 
-def _step(
-    step: LinearisedStep, moves: InputSeeds, seed: Array, state: _DirectState
+def tangent_step(
+    step: LinearisedStep, moves: InputSeeds, seed: Array, state: DirectState
 ) -> tuple[Array, Array]:
     """Go one step on along one component of an input."""
-    rows, arrays = _rows(step, moves, seed, state), _array_rates(step, moves, seed)
+    rows = argument_rates(step, moves, seed, state)
+    arrays = _array_rates(step, moves, seed)
     parts: dict[str, Array] = {}
     for name, elements in step.blocks.items():
         history, moving = state.histories.get(name), arrays.get(name)
@@ -64,7 +65,7 @@ def _step(
     prescribed = np.zeros(len(step.tape.x))
     for h in moves.prescribed:
         mask = h.target >= 0
-        prescribed[h.dofs[mask]] = h.factor[mask] * seed[h.target[mask]]
+        np.add.at(prescribed, h.dofs[mask], h.factor[mask] * seed[h.target[mask]])
     dx = step.solve(-step.summed(parts), prescribed)
     for name in blocks_with_history(step.tape):
         elements = step.blocks[name]
@@ -99,8 +100,8 @@ def _array_rates(
     return rates
 
 
-def _rows(
-    step: LinearisedStep, moves: InputSeeds, seed: Array, front: _DirectState
+def argument_rates(
+    step: LinearisedStep, moves: InputSeeds, seed: Array, front: DirectState
 ) -> Mapping[str, Array]:
     """Rates of the arguments of all blocks that move."""
     rows: dict[str, Array] = {}

@@ -123,18 +123,23 @@ class ElementDerivatives:
         rate = np.zeros_like(self.dofs)
         amounts = rows[:, width]
         if amounts.any():
-            name = _amount(kernel)
-            value = getattr(kernel, name)
-            one = replace(kernel, **{name: value if callable(value) else 1.0})  # type: ignore[type-var]
-            none = replace(kernel, **{name: 0.0})  # type: ignore[type-var]
+            one, none = self.unit_loads()
             rate += amounts[:, None] * (self._at(one, 0.0) - self._at(none, 0.0))
         coordinates = rows[:, :width]
         if coordinates.any():
-            step = _WIDE * self._size() / float(np.abs(coordinates).max())
+            step = _WIDE * self.size() / float(np.abs(coordinates).max())
             for k, weight in _WEIGHTS:
                 ahead = self._at(kernel, k * step * coordinates)
                 rate += weight / (60.0 * step) * (ahead - self._at(kernel, -k * step * coordinates))
         return rate
+
+    def unit_loads(self) -> tuple[Any, Any]:
+        """The load with the amount 1, or with its function, and without any."""
+        kernel: Any = self.block.kernel
+        name = _amount(kernel)
+        value = getattr(kernel, name)
+        one = replace(kernel, **{name: value if callable(value) else 1.0})
+        return one, replace(kernel, **{name: 0.0})
 
     def _at(self, kernel: Any, moved: Array | float) -> Array:
         residual = kernel.residual(
@@ -142,8 +147,8 @@ class ElementDerivatives:
         )
         return np.asarray(residual)
 
-    def _size(self) -> float:
-        """Of the smallest element, or of all of them where they are points."""
+    def size(self) -> float:
+        """Size of the smallest element, or of all of them where they are points."""
         largest = np.abs(self.block.coordinates).max(initial=0.0)
         nodes = self.block.coordinates.reshape(self.n, -1, self._dimension)
         extents = np.ptp(nodes, axis=1).max(axis=1)

@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import (
     Block,
     Load,
@@ -55,6 +56,30 @@ def inputs_of_keys(definition: ProblemDefinition, keys: Sequence[tuple[str, str]
         if not (isinstance(key, tuple) and len(key) == 2):
             raise StudyError(f'{key!r}: an input is a pair, ("rubber", "mu")')
     return [_input(definition, owner, name, None) for owner, name in keys]
+
+
+def components(
+    selected: Sequence[Input], direction: Mapping[tuple[str, str], float | Array]
+) -> Array:
+    """All components (k,) of a direction; zero for inputs without one.  Raises StudyError."""
+    keys = [item.key for item in selected]
+    if not isinstance(direction, Mapping) or not direction:
+        raise StudyError(f"direction = {direction!r}: say how inputs move, {{{keys[0]!r}: 1.0}}")
+    for key in direction:
+        if key not in keys:
+            raise StudyError(
+                f"direction: {key!r} is no input of by; there are {join_names(map(str, keys))}"
+            )
+    parts = []
+    for item in selected:
+        n, value = len(item.value), np.asarray(direction.get(item.key, 0.0))
+        if value.dtype.kind not in "fiu" or value.shape not in ((), (n,)):
+            raise StudyError(
+                f"direction: {item.key!r} needs a number, or an array ({n},), given "
+                f"{type(direction[item.key]).__name__} of shape {value.shape}"
+            )
+        parts.append(np.broadcast_to(value.astype(np.float64), n))
+    return np.concatenate(parts)
 
 
 def _input(definition: ProblemDefinition, owner: str, name: str, mode: Any) -> Input:

@@ -12,7 +12,7 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.definition.problem_definition import (
     Block,
     Load,
@@ -22,6 +22,7 @@ from softehl.runtime.definition.problem_definition import (
 )
 from softehl.runtime.discretisation.loads import NodalForce, Spring, Tie, amount
 from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.sensitivity.differences import WIDE, mixed, slope
 from softehl.runtime.sensitivity.tape import Tape
 
 
@@ -85,11 +86,25 @@ class InputSeeds:
     prescribed: Sequence[PrescribedSeeds] = field(default=())
     arrays: Sequence[ArraySeeds] = field(default=())
 
+    def pull_prescribed(self, gradient: Array, slopes: Array) -> None:
+        """Add derivatives (n,) by prescribed values to the gradient."""
+        for h in self.prescribed:
+            mask = h.target >= 0
+            np.add.at(gradient, h.target[mask], h.factor[mask] * slopes[h.dofs[mask]])
+
 
 Key: TypeAlias = tuple[str, str]
 """Block, load or support, and a name of it: ("rubber", "mu"), ("load:right", "u_y")."""
 
 _WIDE = 1e-3  # of the size of the mesh: step of a difference of order 6 of functions of places
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """Move of an input by a seed (k,)."""
+
+    item: Input
+    seed: Array
 
 
 class Input(Protocol):
@@ -116,6 +131,10 @@ class Input(Protocol):
 
     def put(self, definition: ProblemDefinition, value: Array) -> None:
         """Put a value into a definition."""
+        ...
+
+    def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
+        """Rates of `seeds(tape).prescribed` as inputs move; of linear ones none."""
         ...
 
 
@@ -150,6 +169,10 @@ class PageParameter:
             parameters = {**definition.blocks[block.name].parameters, self.key[1]: changed_value}
             changed = replace(definition.blocks[block.name], parameters=parameters)
             definition.blocks[block.name] = changed
+
+    def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
+        """See `Input`."""
+        return []
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,6 +239,10 @@ class PageDatum:
             definition.blocks[block.name] = replace(block_now, data=data)
             start += n
 
+    def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
+        """See `Input`."""
+        return []
+
 
 @dataclass(frozen=True, eq=False)
 class LoadAmount:
@@ -251,6 +278,10 @@ class LoadAmount:
             kernel: Any = replace(force.kernel, **changes)  # type: ignore[arg-type]
             definition.forces[number] = replace(force, kernel=kernel)
 
+    def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
+        """See `Input`."""
+        return []
+
 
 @dataclass(frozen=True, eq=False)
 class SupportValue:
@@ -269,11 +300,9 @@ class SupportValue:
     def seeds(self, tape: Tape) -> InputSeeds:
         """See `Input`."""
         prescribed, system, step = [], tape.system, tape.step
-        for c in self.conditions:
+        for c, dofs, mask in _conditions(tape, self.conditions):
             unit_value = c.value if callable(c.value) else 1.0
             rates = amount(unit_value, system.mesh.points[c.nodes], step.t, step.factor)
-            dofs = system.numbering.nodal[c.name][c.nodes]
-            mask = dofs >= 0
             prescribed.append(PrescribedSeeds(dofs[mask], _one(int(mask.sum())), rates[mask]))
         return InputSeeds(prescribed=prescribed)
 
@@ -283,6 +312,16 @@ class SupportValue:
             condition = definition.conditions[number]
             changed_value: Any = _changed(condition.value, float(value[0]))
             definition.conditions[number] = replace(condition, value=changed_value)
+
+    def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
+        """See `Input`."""
+        curvatures = []
+        for c, dofs, mask in _conditions(tape, self.conditions):
+            dX = displacement(others, c.nodes)
+            if callable(c.value) and dX.any():
+                rates = slope(_values(c, tape, dX), _span(tape) / float(np.abs(dX).max()))
+                curvatures.append(PrescribedSeeds(dofs[mask], _one(int(mask.sum())), rates[mask]))
+        return curvatures
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,11 +385,9 @@ class NodeCoordinates:
     def _prescribed(self, tape: Tape) -> Iterator[PrescribedSeeds]:
         """Functions of places that prescribe values."""
         step, wide = tape.step, _WIDE * float(np.ptp(self.mesh.points, axis=0).max())
-        for c in tape.system.conditions:
+        for c, dofs, mask in _conditions(tape, tape.system.conditions):
             if not callable(c.value):
                 continue
-            dofs = tape.system.numbering.nodal[c.name][c.nodes]
-            mask = dofs >= 0
             nodes = c.nodes[mask]
             coordinates, along = self.mesh.points[nodes], wide * self.directions[nodes]
             rates = np.zeros(len(nodes))
@@ -361,6 +398,68 @@ class NodeCoordinates:
                 )
                 rates += weight / (60.0 * wide) * (ahead - backward)
             yield PrescribedSeeds(dofs[mask], self.targets[nodes], rates)
+
+    def displacement(self, seed: Array, nodes: Integers) -> Array:
+        """How nodes move with the components, (n, dim)."""
+        targets = self.targets[nodes]
+        moved: Array = np.where(targets >= 0, seed[targets], 0.0)[:, None] * self.directions[nodes]
+        return moved
+
+    def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
+        """See `Input`."""
+        curvatures, span = [], _span(tape)
+        for c, dofs, mask in _conditions(tape, tape.system.conditions):
+            dX, axes = displacement(others, c.nodes), self.directions[c.nodes]
+            if not callable(c.value) or not axes.any():
+                continue
+            factor = sum(m.seed[0] for m in others if _supports(m.item, c))
+            rates = factor * slope(_values(c, tape, axes), span / float(np.abs(axes).max()))
+            if dX.any():
+                units = axes / np.abs(axes).max(), dX / np.abs(dX).max()
+                bend = mixed(_values(c, tape, *units), span)
+                rates = rates + np.abs(axes).max() * np.abs(dX).max() * bend
+            curvatures.append(PrescribedSeeds(dofs[mask], self.targets[c.nodes[mask]], rates[mask]))
+        return curvatures
+
+
+def _conditions(
+    tape: Tape, conditions: Sequence[PrescribedValues]
+) -> Iterator[tuple[PrescribedValues, Integers, Flags]]:
+    """Conditions with the unknowns of their nodes, and a mask that has each unknown once."""
+    earlier: Integers = np.empty(0, dtype=np.int64)
+    for c in conditions:
+        dofs = tape.system.numbering.nodal[c.name][c.nodes]
+        yield c, dofs, (dofs >= 0) & ~np.isin(dofs, earlier)
+        earlier = np.concatenate([earlier, dofs])
+
+
+def displacement(moves: Sequence[Move], nodes: Integers) -> Array:
+    """How nodes move with all inputs, (n, dim); zeros where none moves them."""
+    parts = [
+        m.item.displacement(m.seed, nodes) for m in moves if isinstance(m.item, NodeCoordinates)
+    ]
+    return np.asarray(sum(parts, np.zeros((len(nodes), 1))))
+
+
+def _supports(item: Input, condition: PrescribedValues) -> bool:
+    """True if an input is a factor of a prescribed value."""
+    return isinstance(item, SupportValue) and any(c is condition for c in item.conditions)
+
+
+def _values(c: PrescribedValues, tape: Tape, *axes: Array) -> Callable[..., Array]:
+    """Prescribed values (n,) at places that move along axes (n, dim)."""
+    places, step = tape.system.mesh.points[c.nodes], tape.step
+
+    def values(*steps: float) -> Array:
+        moved = sum((s * axis for s, axis in zip(steps, axes, strict=True)), places)
+        return amount(c.value, moved, step.t, step.factor)
+
+    return values
+
+
+def _span(tape: Tape) -> float:
+    """Step of differences of functions of places."""
+    return WIDE * float(np.ptp(tape.system.mesh.points, axis=0).max())
 
 
 def varied_definition_of(

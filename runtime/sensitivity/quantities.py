@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from softehl.runtime.mesh.mesh import MeshError, place_text
 from softehl.runtime.sensitivity.linearised_step import LinearisedStep
 from softehl.runtime.sensitivity.tape import Tape
 from softehl.runtime.suggestions import did_you_mean, join_names
+
+UserFunction: TypeAlias = Callable[[Array], tuple[float, Array] | tuple[float, Array, Any]]
+_WITH_HESSIAN = 3  # values of a function of the unknowns: with gradient and Hessian
 
 
 class Quantity(Protocol):
@@ -31,6 +34,10 @@ class Quantity(Protocol):
 
     def weights(self, step: LinearisedStep) -> Array:
         """Weights (n,) with which it counts the forces that make reactions, zero if it does not."""
+        ...
+
+    def curvature(self, step: LinearisedStep, dx: Array) -> Array:
+        """Rate (n,) of its derivative by the unknowns along dx (n,); forces apart."""
         ...
 
 
@@ -68,6 +75,10 @@ class PointValue:
         """See `Quantity`."""
         return np.zeros(step.tape.system.size)
 
+    def curvature(self, step: LinearisedStep, dx: Array) -> Array:
+        """See `Quantity`."""
+        return np.zeros_like(dx)
+
 
 @dataclass(frozen=True)
 class ReactionSum:
@@ -94,12 +105,18 @@ class ReactionSum:
         found[side_dofs[side_dofs >= 0]] = 1.0
         return found
 
+    def curvature(self, step: LinearisedStep, dx: Array) -> Array:
+        """See `Quantity`."""
+        return np.zeros_like(dx)
+
 
 @dataclass(frozen=True)
 class UserQuantity:
-    """A function of all unknowns (n,) that returns its value and its gradient (n,)."""
+    """A function of all unknowns (n,) that returns its value and its gradient (n,), and for second
+    derivatives its Hessian (n, n).
+    """
 
-    function: Callable[[Array], tuple[float, Array]]
+    function: UserFunction
 
     def value(self, tape: Tape) -> float:
         """See `Quantity`."""
@@ -119,9 +136,26 @@ class UserQuantity:
         """See `Quantity`."""
         return np.zeros(len(step.tape.x))
 
+    def curvature(self, step: LinearisedStep, dx: Array) -> Array:
+        """See `Quantity`."""
+        values: Any = self.function(step.tape.x)
+        if len(values) != _WITH_HESSIAN:
+            raise StudyError(
+                "second derivatives of a function of the unknowns need its own: let it return "
+                "(value, gradient (n,), Hessian (n, n)), an array, a sparse matrix or a "
+                "LinearOperator"
+            )
+        hessian = values[2]
+        if np.shape(hessian) != (len(dx), len(dx)):
+            raise StudyError(
+                f"the Hessian of a quantity has the shape {np.shape(hessian)}, must be "
+                f"{(len(dx), len(dx))}"
+            )
+        return np.asarray(hessian @ dx)
+
 
 def quantity(
-    what: str | Callable[[Array], tuple[float, Array]],
+    what: str | UserFunction,
     at: tuple[float, ...] | None,
     reaction: str | None,
 ) -> Quantity:

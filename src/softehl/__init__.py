@@ -372,7 +372,7 @@ def load_kernel(
     cell: str | None = None,
     geometry: str | None = None,
     materials: bool = False,
-    derivatives: bool = False,
+    derivatives: int = 0,
 ) -> "Kernel":
     """Return a compiled kernel; derive and compile it if the cache does not have it.
 
@@ -390,9 +390,10 @@ def load_kernel(
         Geometry of a page of fields: "plane strain" (the default), "axisymmetric" or "solid".
     materials : bool
         Take the stress laws of a file, as bodies, in place of its pages.
-    derivatives : bool
-        Add the tasks `pseudo_load` and `fields_rate`, for derivatives of results; the point data
-        are then those of the page and the rate of each.
+    derivatives : int
+        1: add the tasks `pseudo_load` and `fields_rate`, for derivatives of results; the point data
+        are then those of the page and the rate of each. 2: only the tasks `adjoint_rate` and
+        `point_adjoint_rate`, for second derivatives; the adjoint of each datum and its rate follow.
 
     Returns
     -------
@@ -425,7 +426,7 @@ def load_kernel(
         with with_sympy():
             from softehl.codegen.models import ALL
 
-            return load_kernel(ALL[source](), derivatives=True)
+            return load_kernel(ALL[source](), derivatives=derivatives)
     if isinstance(source, (str, Path)) and folder_given:
         return kernel.kernel_in(Path(source).resolve(), name, cell)
     from softehl.codegen.tools import kernel_cache

@@ -30,13 +30,15 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     ((), lambda at: at.solver == "matrix-free" and at.analysis == "follow", "it factorises"),
     ((), lambda at: at.solver == "amg" and at.analysis == "follow", "it factorises"),
     ((), lambda at: at.solver == "matrix-free" and at.law != "product", "no product by sum"),
-    (("sensitivity",), _moves, "has no derivatives"),
+    (("sensitivity", "hessian"), _moves, "has no derivatives"),
     (
-        ("sensitivity",),
+        ("sensitivity", "hessian"),
         lambda at: at.analysis == "follow" and at.properties.history,
         "depends on the steps before it",
     ),
     ((), _again, "prescribed twice"),
+    (("hessian",), lambda at: at.load == "weight", "comes as C without second derivatives"),
+    (("hessian",), lambda at: at.law in ("ogden", "split"), "no third derivatives"),
     (
         ("static state", "equilibrium"),
         lambda at: at.analysis == "explicit" and _mixed(at),

@@ -254,6 +254,26 @@ def sensitivity(at: Problem) -> Pairs:
     yield np.array(slopes, dtype=np.float64), known
 
 
+def hessian(at: Problem) -> Pairs:
+    """Second derivatives by a constant of the law are differences of first ones."""
+    name = at.properties.parameter
+    size, by = at.properties.given[name], {"body": [name]}
+
+    def slopes(change: float) -> Array:
+        constants: Any = {name: size * (1.0 + change)}
+        result = at.run(at.study(again=True, **constants))
+        asked: Any = ({"at": at.corner}, {"reaction": "left"})
+        return np.array([result.sensitivity("u_y", by=by, **a)["body", name] for a in asked])
+
+    result, step, pair = at.run(at.study(again=True)), 1e-4, (("body", name), ("body", name))
+    values = [
+        result.hessian("u_y", at=at.corner, by=by)[pair],
+        result.hessian("u_y", reaction="left", by=by)[pair],
+    ]
+    known = (slopes(step) - slopes(-step)) / (2.0 * step * size)
+    yield np.array(values, dtype=np.float64), known
+
+
 def restarted(at: Problem) -> Pairs:
     """A march that is interrupted and restarted is the one that is not."""
     study = at.study()
@@ -468,6 +488,13 @@ RELATIONS: dict[str, Relation] = {
         (("law", "analysis"), ("law", "constraint"), ("analysis", "load")),
         quick=("load", "constraint", "analysis"),
         tolerance=1e-4,
+    ),
+    "hessian": Relation(
+        hessian,
+        ("law", "load", "constraint", "analysis", "solver"),
+        (("law", "analysis"), ("law", "constraint"), ("analysis", "load")),
+        quick=("load", "constraint", "analysis"),
+        tolerance=1e-5,
     ),
     "restart": Relation(
         restarted,
