@@ -62,6 +62,7 @@ from softehl.runtime.results.explanation import explain_at
 from softehl.runtime.results.result import Modes, Result
 from softehl.runtime.sensitivity.input_parsing import By
 from softehl.runtime.sensitivity.inputs import Key
+from softehl.runtime.sensitivity.quantities import UserFunction
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.suggestions import short_list
 
@@ -855,7 +856,7 @@ class Study:
 
     def objective(
         self,
-        what: str | Callable[[Array], tuple[float, Array]],
+        what: str | UserFunction,
         *,
         by: By,
         at: tuple[float, ...] | None = None,
@@ -924,6 +925,8 @@ class Study:
         bounds: Bounds | None = None,
         sigma: float | Array | None = None,
         most: int = 100,
+        method: Any = "gauss-newton",
+        integrator: Any = None,
         **path: Any,
     ) -> Fit:
         """Fit inputs to measurements by least squares, from their present values on.
@@ -944,6 +947,12 @@ class Study:
             the same weight, and the covariance follows from the residuals.
         most : int
             Largest number of evaluations.
+        method : str
+            "gauss-newton": the trust region of SciPy with the exact Jacobian. "newton": Newton's
+            method with exact second derivatives, which takes fewer evaluations where the residuals
+            stay large; its covariance holds there, too. Another value is the `method` of `march`.
+        integrator : str or object, optional
+            `method` of `march`, if `method` is that of the fit.
         **path
             Arguments of `solve`, or of `march` if there is a `dt`.
 
@@ -966,6 +975,8 @@ class Study:
             bounds=bounds,
             sigma=sigma,
             most=most,
+            method=method,
+            integrator=integrator,
             arguments=path,
         )
 

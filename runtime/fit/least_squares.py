@@ -1,4 +1,4 @@
-"""Least squares by SciPy's trust region with the exact Jacobian."""
+"""Least squares: SciPy's trust region with the exact Jacobian, or Newton's method."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from softehl.runtime.definition.argument_checks import finite
 from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.fit.objective import StudyEvaluations
+from softehl.runtime.fit.trust_region import minimise
 from softehl.runtime.kernels.kernel_call import ArgumentError
 from softehl.runtime.results.result import Result
+from softehl.runtime.sensitivity.hessian import Term, hessian_products
 from softehl.runtime.sensitivity.input_parsing import By
 from softehl.runtime.sensitivity.inputs import Input, Key, PageArray, PageDatum, PageParameter
 from softehl.runtime.sensitivity.jacobian import Entry, by_key, jacobian
@@ -152,6 +154,10 @@ def _limits(inputs: Sequence[Input], bounds: Bounds) -> tuple[Array, Array]:
 
 _FAILED = (NotConverged, ArgumentError, ProblemError)
 """Ends of a trial after which the next one is nearer to the last that was solved."""
+GAUSS_NEWTON, NEWTON = "gauss-newton", "newton"
+"""Methods: SciPy's trust region with the Jacobian, and Newton's with second derivatives."""
+_STEP = 1e-9
+"""Of the inputs: length of a step after which the next one would be its square."""
 _SPAN = 1e-9  # of the whole path: two steps that near are one
 _RANK = 1e-12  # of the largest singular value: below, inputs are not determined
 
@@ -165,7 +171,10 @@ class Fit:
     values : dict
         Input -> number or array.
     covariance : array (k, k)
-        Of all components in order; inf where the measurements do not determine them.
+        Of all components in order; inf where the measurements do not determine them. With the
+        Jacobian J of the residuals over their deviations and the Hessian H of half the sum of their
+        squares, s^2 H^-1 J^T J H^-1; Gauss-Newton takes J^T J for H, which leaves s^2 (J^T J)^-1.
+        s is 1 if `sigma` was given, else s^2 is the sum of squares over m - k.
     residuals : array (m,)
         Results less measurements.
     evaluations : int
@@ -200,6 +209,17 @@ class Fit:
         """Standard deviations (k,) of the components."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
+    @property
+    def standard_errors(self) -> dict[Key, float | Array]:
+        """Standard deviations by input, as `values`."""
+        errors: dict[Key, float | Array] = {}
+        start = 0
+        for key, value in self.values.items():
+            part = self.deviations[start : start + np.size(value)]
+            errors[key] = float(part[0]) if np.ndim(value) == 0 else part
+            start += np.size(value)
+        return errors
+
 
 @dataclass(frozen=True, eq=False)
 class LeastSquares:
@@ -209,10 +229,30 @@ class LeastSquares:
     data: Measurements
     sigma: Array | None
 
-    def fit(self, bounds: Bounds | None, max_evaluations: int) -> Fit:
+    def fit(self, bounds: Bounds | None, max_evaluations: int, method: str) -> Fit:
         """The best inputs.  Raises StudyError, NotConverged for the start."""
         scale = SearchVariables.of(self.trials.inputs, bounds or {})
         self.residuals(self.trials.start)  # an error here is that of the study as it is given
+        search = self._gauss_newton if method == GAUSS_NEWTON else self._newton
+        y, message = search(scale, max_evaluations)
+        values = scale.values(y)
+        residuals, rates = self.residuals(values), scale.derivatives(y)
+        J = self.jacobian(values) * rates
+        curvature = None
+        if method == NEWTON:
+            curvature = J.T @ J + self._bend(values, residuals) * np.outer(rates, rates)
+        covariance, remark = self._covariance(J, curvature, residuals, rates)
+        return Fit(
+            by_key(values, self.trials.inputs),
+            covariance,
+            residuals * self._scales(),
+            self.trials.count,
+            self.trials.solved(values)[-1],
+            f"{message}{remark}",
+        )
+
+    def _gauss_newton(self, scale: SearchVariables, max_evaluations: int) -> tuple[Array, str]:
+        """Variables (k,) by SciPy's trust region, and the reason of the end."""
 
         def residuals(y: Array) -> Array:
             return self._tried(scale.values(y))
@@ -226,25 +266,47 @@ class LeastSquares:
             derivatives,
             bounds=(scale.lower, scale.upper),
             ftol=1e-14,
-            xtol=1e-9,  # the step after it would be its square
+            xtol=_STEP,
             gtol=None,
             max_nfev=max_evaluations,
         )
         if search.status == 0:
-            raise StudyError(
-                f"fit: {max_evaluations} trials were not enough: give most=..., or a better start"
-            )
-        values = scale.values(search.x)
-        last = self.trials.solved(values)[-1]
-        covariance, remark = self._covariance(search.jac, search.fun, scale.derivatives(search.x))
-        return Fit(
-            by_key(values, self.trials.inputs),
-            covariance,
-            search.fun * self._scales(),
-            self.trials.count,
-            last,
-            f"{search.message}{remark}",
+            raise _too_few(max_evaluations)
+        return search.x, search.message
+
+    def _newton(self, scale: SearchVariables, max_evaluations: int) -> tuple[Array, str]:
+        """Variables (k,) by Newton's method, and the reason of the end."""
+
+        def value(y: Array) -> float:
+            residuals = self._tried(scale.values(y))
+            return float(residuals @ residuals) / 2.0
+
+        def derivatives(y: Array) -> tuple[Array, Array]:
+            values, rates = scale.values(y), scale.derivatives(y)
+            residuals, J = self.residuals(values), self.jacobian(values)
+            gradient = J.T @ residuals
+            H = J.T @ J + self._bend(values, residuals)
+            bent = np.where(scale.positive, gradient * values, 0.0)
+            return rates * gradient, H * np.outer(rates, rates) + np.diag(bent)
+
+        minimum = minimise(
+            value,
+            derivatives,
+            scale.start,
+            bounds=(scale.lower, scale.upper),
+            tolerance=_STEP,
+            more=lambda: self.trials.count < max_evaluations,
         )
+        if not minimum.converged:
+            raise _too_few(max_evaluations)
+        return minimum.y, "The last Newton step was below 1e-9 of the inputs."
+
+    def _bend(self, values: Array, residuals: Array) -> Array:
+        """Sum of residuals times their second derivatives by the inputs, (k, k)."""
+        weights = residuals / self._scales()
+        entries = zip(self._entries(values), weights.tolist(), strict=True)
+        terms = [Term(tape, q, weight) for (tape, q), weight in entries]
+        return hessian_products(terms, self.trials.inputs, np.eye(len(values)))
 
     def residuals(self, values: Array) -> Array:
         """Results less measurements, (m,), over their deviations or sizes."""
@@ -284,20 +346,37 @@ class LeastSquares:
             entries.append((tape, q))
         return entries
 
-    def _covariance(self, J: Array, residuals: Array, derivatives: Array) -> tuple[Array, str]:
-        """Inverse of J^T J, times the variance of the residuals if no deviations were given.
+    def _covariance(
+        self, J: Array, curvature: Array | None, residuals: Array, rates: Array
+    ) -> tuple[Array, str]:
+        """How the errors of measurements become errors of the inputs, to first order, (k, k).
 
-        derivatives: of the inputs by what J is taken by.
+        curvature: the Hessian H, None for J^T J. The inputs move by -H^-1 J^T e with errors e of
+        the measurements: s^2 H^-1 J^T J H^-1, where s^2 is 1 with given deviations, else the
+        variance of the residuals. rates: of the inputs by what J and H are taken by.
         """
         m, k = J.shape
         _, sizes, rows = np.linalg.svd(J, full_matrices=False)
-        if m < k or sizes[-1] <= _RANK * sizes[0]:
+        singular = m < k or sizes[-1] <= _RANK * sizes[0]
+        if not singular and curvature is not None:
+            stiff = np.linalg.eigvalsh((curvature + curvature.T) / 2.0)
+            singular = stiff[0] <= _RANK**2 * stiff[-1]
+        if singular:
             return np.full((k, k), np.inf), " What was measured does not determine all inputs."
-        half = (rows.T / sizes) * derivatives[:, None]
+        half = rows.T / sizes
+        if curvature is not None:
+            half = np.linalg.solve(curvature, rows.T * sizes)
+        half = half * rates[:, None]
         scale = 1.0
         if self.sigma is None:
             scale = float(residuals @ residuals) / (m - k) if m > k else np.inf
         return scale * half @ half.T, ""
+
+
+def _too_few(max_evaluations: int) -> StudyError:
+    return StudyError(
+        f"fit: {max_evaluations} trials were not enough: give most=..., or a better start"
+    )
 
 
 def fit(
@@ -308,9 +387,17 @@ def fit(
     bounds: Bounds | None = None,
     sigma: float | Array | None = None,
     most: int = 100,
+    method: Any = GAUSS_NEWTON,
+    integrator: Any = None,
     arguments: Mapping[str, Any],
 ) -> Fit:
     """Fit inputs to measurements by least squares; see `Study.fit`."""
+    if method not in (GAUSS_NEWTON, NEWTON):
+        if integrator is not None or "dt" not in arguments:
+            raise StudyError(f"fit: method = {method!r}, must be {GAUSS_NEWTON!r} or {NEWTON!r}")
+        method, integrator = GAUSS_NEWTON, method
+    if integrator is not None:
+        arguments = {**arguments, "method": integrator}
     until = finite("until", arguments.get("until", 1.0))
     count = arguments.get("steps", 1)
     times = until * np.arange(1, count + 1) / count
@@ -320,4 +407,4 @@ def fit(
     data = Measurements.read(measured, times)
     deviations = None if sigma is None else np.broadcast_to(sigma, data.numbers.shape).copy()
     trials = StudyEvaluations.by(definition, by, arguments)
-    return LeastSquares(trials, data, deviations).fit(bounds, most)
+    return LeastSquares(trials, data, deviations).fit(bounds, most, method)

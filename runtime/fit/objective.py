@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,10 +17,11 @@ from softehl.runtime.definition.problem_definition import ProblemDefinition, Stu
 from softehl.runtime.equations.stability import UnstableState
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity import input_parsing
+from softehl.runtime.sensitivity.hessian import Term, hessian_products
 from softehl.runtime.sensitivity.input_parsing import By
 from softehl.runtime.sensitivity.inputs import Input, Key, varied_definition_of
 from softehl.runtime.sensitivity.jacobian import jacobian
-from softehl.runtime.sensitivity.quantities import Quantity, quantity
+from softehl.runtime.sensitivity.quantities import Quantity, UserFunction, quantity
 from softehl.runtime.suggestions import short_list
 
 
@@ -77,7 +78,8 @@ class StudyEvaluations:
 class Objective:
     """Quantity as a function of inputs (k,), which returns its value and its gradient (k,).
 
-    `scipy.optimize.minimize(objective, objective.start, jac=True)` takes it.
+    `scipy.optimize.minimize(objective, objective.start, jac=True)` takes it, and with
+    `hess=objective.hessian` or `hessp=objective.hessian_product` methods of second order.
 
     Attributes
     ----------
@@ -128,10 +130,58 @@ class Objective:
         row = jacobian([(tape, self.quantity)], self.trials.inputs)[0]
         return self.quantity.value(tape), row
 
+    def hessian(self, values: Array) -> Array:
+        """Return the second derivatives.
+
+        Parameters
+        ----------
+        values : array (k,)
+            Values of the inputs.
+
+        Returns
+        -------
+        array (k, k)
+            Second derivatives; see `Result.hessian`.
+
+        Raises
+        ------
+        NotConverged
+            The study has no solution for these values.
+        """
+        return self._products(values, np.eye(len(self.start)))
+
+    def hessian_product(self, values: Array, direction: Array) -> Array:
+        """Return the second derivatives times a direction; two linear solutions a step.
+
+        Parameters
+        ----------
+        values : array (k,)
+            Values of the inputs.
+        direction : array (k,)
+            The direction.
+
+        Returns
+        -------
+        array (k,)
+            The product.
+
+        Raises
+        ------
+        NotConverged
+            The study has no solution for these values.
+        """
+        along = np.asarray(direction, dtype=np.float64)
+        return np.asarray(self._products(values, along[:, None])[:, 0])
+
+    def _products(self, values: Array, directions: Array) -> Array:
+        tape = self.trials.solved(np.asarray(values, dtype=np.float64))[-1].trail
+        assert tape is not None
+        return hessian_products([Term(tape, self.quantity)], self.trials.inputs, directions)
+
 
 def objective(
     definition: ProblemDefinition,
-    what: str | Callable[[Array], tuple[float, Array]],
+    what: str | UserFunction,
     *,
     by: By,
     at: tuple[float, ...] | None = None,

@@ -493,7 +493,7 @@ RELATIONS: dict[str, Relation] = {
         hessian,
         ("law", "load", "constraint", "analysis", "solver"),
         (("law", "analysis"), ("law", "constraint"), ("analysis", "load")),
-        quick=("load", "constraint", "analysis"),
+        quick=("analysis",),
         tolerance=1e-5,
     ),
     "restart": Relation(

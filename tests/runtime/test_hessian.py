@@ -82,8 +82,9 @@ def check(solved: Callable[..., Result], start: dict[str, float], **asked: Any) 
 
     def slopes(s: float) -> Array:
         values = {n: v + s * d for (n, v), d in zip(start.items(), direction, strict=True)}
-        found = np.array([*solved(**values).sensitivity(**asked).values()])
-        return np.asarray(found) / np.array([values[n] if n == "wave" else 1.0 for n in start])
+        found: Array = np.array([*solved(**values).sensitivity(**asked).values()])
+        found /= np.array([values[n] if n == "wave" else 1.0 for n in start])
+        return found
 
     signs = np.random.default_rng(len(start)).uniform(0.5, 1.0, len(start))
     direction = signs * np.array([*start.values()])
@@ -229,10 +230,66 @@ def test_what_does_not_exist_is_refused() -> None:
     with pytest.raises(StudyError, match="second derivatives through contact of bodies do not"):
         touching().solve(steps=2).hessian("u_y", **asked)
     other: Any = {"at": (1.0,), "by": {"bar": ["E", "s"]}}
-    for direction, words in {
-        (): "say how inputs move",
-        (("bar", "F"), 1.0): r"direction: \('bar', 'F'\) is no input of by; there are",
-        (("bar", "s"), (1.0, 2.0, 3.0)): r"needs a number, or an array \(2,\)",
-    }.items():
+    directions: list[tuple[Any, str]] = [
+        ({}, "say how inputs move"),
+        ({("bar", "F"): 1.0}, r"direction: \('bar', 'F'\) is no input of by; there are"),
+        ({("bar", "s"): (1.0, 2.0, 3.0)}, r"needs a number, or an array \(2,\)"),
+    ]
+    for direction, words in directions:
         with pytest.raises(StudyError, match=words):
-            pulled().hessian_product("u", direction=dict([direction]) if direction else {}, **other)
+            pulled().hessian_product("u", direction=direction, **other)
+
+
+def loaded_bar(F: float = 3.0) -> Study:
+    study = Study(Mesh.line(1.0, cells=2))
+    study.add("bar", bar, E=2.0, s=[1.0, 0.5])
+    study.fix("left", u=0)
+    study.load("right", u=F)
+    return study
+
+
+def test_covariance_of_a_linear_regression() -> None:
+    """u = F x at the middle and the end: the variance of F is s^2 / (x . x)."""
+    measured = {(0.5,): {"u": 1.0}, (1.0,): {"u": 2.0}}
+    x = np.array([0.25, 0.75])
+    F = float(x @ [1.0, 2.0] / (x @ x))
+    for method in ("gauss-newton", "newton"):
+        fit = loaded_bar().fit(measured, by={"load:right": "u"}, method=method)
+        s2 = float(((F * x - [1.0, 2.0]) ** 2).sum())
+        assert fit.values["load:right", "u"] == pytest.approx(F, rel=1e-10)
+        assert fit.standard_errors["load:right", "u"] == pytest.approx((s2 / (x @ x)) ** 0.5)
+
+
+def test_covariance_is_how_the_fit_follows_the_measurements() -> None:
+    """Large residuals: slopes of the fitted value by each measurement, by differences."""
+    sigma, step, mu = 0.1, 1e-3, ("body", "mu")
+    base = np.array([0.2, 1.0])
+
+    def fitted(numbers: Array, method: str = "newton") -> Any:
+        study = panel().varied({("load:right", "u_y"): 0.2})
+        measured: Any = {PLACE: {"u_y": numbers.tolist()}}
+        by = {"body": "mu"}
+        return study.fit(measured, by=by, sigma=sigma, method=method, steps=2, newton=EXACT)
+
+    values = [[fitted(base + s * step * e).values[mu] for s in (1, -1)] for e in np.eye(2)]
+    slopes = np.array([(a - b) / (2 * step) for a, b in values])
+    variance = sigma**2 * float(slopes @ slopes)
+    assert fitted(base).covariance[0, 0] == pytest.approx(variance, rel=1e-4)
+    assert abs(fitted(base, "gauss-newton").covariance[0, 0] / variance - 1) > 0.1
+
+
+def test_methods_of_a_fit_and_of_a_march_are_told_apart() -> None:
+    measured, by = {(1.0,): {"u": 2.0}}, {"bar": "E"}
+    with pytest.raises(StudyError, match="method = 'newtn', must be 'gauss-newton' or 'newton'"):
+        loaded_bar().fit(measured, by=by, method="newtn")
+    options: Any = ({"method": "bdf2"}, {"method": "newton", "integrator": "bdf2"})
+    values = [loaded_bar().fit(measured, by=by, dt=0.5, until=1, **o).values for o in options]
+    assert values[0]["bar", "E"] == pytest.approx(values[1]["bar", "E"], rel=1e-8)
+
+
+def test_hessian_of_an_objective() -> None:
+    tip = loaded_bar().objective("u", at=(1.0,), by={"bar": "E", "load:right": "u"})
+    p = np.array([2.0, 3.0])
+    expected = np.array([[3 * 3 / 2**3, -1.5 / 4], [-1.5 / 4, 0.0]])
+    assert tip.hessian(p) == pytest.approx(expected, abs=1e-14)
+    assert tip.hessian_product(p, np.array([1.0, 2.0])) == pytest.approx(expected @ [1.0, 2.0])
