@@ -206,6 +206,10 @@ class PageArray:
             arrays[self.key[1]] = arrays[self.key[1]].with_values(value)
             definition.blocks[block.name] = replace(definition.blocks[block.name], arrays=arrays)
 
+    def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
+        """See `Input`."""
+        return []
+
 
 @dataclass(frozen=True, eq=False)
 class PageDatum:
