@@ -105,9 +105,7 @@ def definition_of(folder: Path, kernel: str) -> Definition | None:
     return next((d for d in definitions if d.name == kernel), None)
 
 
-def _folder_of(
-    source: Path | Definition | Page | Law, where: CellKey, *, derivatives: bool
-) -> Path:
+def _folder_of(source: Path | Definition | Page | Law, where: CellKey, *, derivatives: int) -> Path:
     cells, geometry, materials = where
     if derivatives:
         return _for_derivatives(source, where, derivatives)
@@ -171,7 +169,7 @@ def of_law(name: str, where: CellKey, *, derivatives: int = 0) -> Path:
     return folder
 
 
-def _folder_of_law(name: str, where: CellKey, *, derivatives: bool) -> Path:
+def _folder_of_law(name: str, where: CellKey, *, derivatives: int) -> Path:
     cells, geometry, _ = where
     key = store.digest(["law", generator(), name, *cells, geometry, str(derivatives)])
     files = store.recall(key)
