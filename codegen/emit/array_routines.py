@@ -146,38 +146,42 @@ _LANES = _Kind(
     "softehl_blend(softehl_lt({}, {}), {}, {})",
 )
 
-_DENSE = """/* z += W h and h += W^T z of n rows of m weights. */
-static inline void softehl_dense@S(int n, int m, const double *W, const @T *h, @T *z)
-{
-    int i = 0;
-    for (; i + 4 <= n; i += 4, W += 4 * m) {
-        @T a = z[i], b = z[i + 1], c = z[i + 2], d = z[i + 3];
-        for (int j = 0; j < m; ++j) {
-            a += W[j] * h[j], b += W[m + j] * h[j];
-            c += W[2 * m + j] * h[j], d += W[3 * m + j] * h[j];
-        }
-        z[i] = a, z[i + 1] = b, z[i + 2] = c, z[i + 3] = d;
-    }
-    for (; i < n; ++i, W += m)
-        for (int j = 0; j < m; ++j) z[i] += W[j] * h[j];
-}
+ROWS = 8
+"""Sums of a product with weights that are formed at once: as many as the latency of one needs."""
 
-static inline void softehl_dense_back@S(int n, int m, const double *W, const @T *z, @T *h)
-{
-    int i = 0;
-    for (; i + 4 <= n; i += 4, W += 4 * m)
-        for (int j = 0; j < m; ++j)
-            h[j] += (W[j] * z[i] + W[m + j] * z[i + 1])
-                + (W[2 * m + j] * z[i + 2] + W[3 * m + j] * z[i + 3]);
-    for (; i < n; ++i, W += m)
-        for (int j = 0; j < m; ++j) h[j] += W[j] * z[i];
-}
 
-static inline void softehl_copy@S(int n, const double *b, @T *z)
-{
-    for (int i = 0; i < n; ++i) z[i] = @splat(b[i]);
-}
-"""
+def _dense() -> str:
+    """z += W h and h += W^T z of n rows of m weights, several sums at once."""
+    sums = range(ROWS)
+
+    def block(count: str, head: str, inner: str, weight: str, source: str, to: str) -> str:
+        declared = ", ".join(f"s{k} = {to}[{head} + {k}]" for k in sums)
+        added = " ".join(f"s{k} += {weight.format(k=k)} * {source};" for k in sums)
+        stored = " ".join(f"{to}[{head} + {k}] = s{k};" for k in sums)
+        return (
+            f"    for (; {head} + {ROWS} <= {count}; {head} += {ROWS}) {{\n"
+            f"        @T {declared};\n"
+            f"        for ({inner}) {{\n            const @T v = {source};\n"
+            f"            {added.replace(source, 'v')}\n        }}\n        {stored}\n    }}\n"
+        )
+
+    forth = block("n", "i", "int j = 0; j < m; ++j", "W[(i + {k}) * m + j]", "h[j]", "z")
+    back = block("m", "j", "int i = 0; i < n; ++i", "W[i * m + j + {k}]", "z[i]", "h")
+    return (
+        "/* z += W h of n rows of m weights. */\n"
+        "static void softehl_dense@S(int n, int m, const double *W, const @T *h, @T *z)\n"
+        f"{{\n    int i = 0;\n{forth}"
+        "    for (; i < n; ++i)\n"
+        "        for (int j = 0; j < m; ++j) z[i] += W[i * m + j] * h[j];\n}\n\n"
+        "/* h += W^T z. */\n"
+        "static inline void softehl_dense_back@S(\n"
+        "    int n, int m, const double *W, const @T *z, @T *h)\n"
+        f"{{\n    int j = 0;\n{back}"
+        "    for (; j < m; ++j)\n"
+        "        for (int i = 0; i < n; ++i) h[j] += W[i * m + j] * z[i];\n}\n\n"
+        "static inline void softehl_copy@S(int n, const double *b, @T *z)\n"
+        "{\n    for (int i = 0; i < n; ++i) z[i] = @splat(b[i]);\n}\n"
+    )
 
 
 def _series() -> Iterator[str]:
@@ -188,8 +192,8 @@ def _series() -> Iterator[str]:
 
 
 _PLUS = (
-    """    const @T a = @abs(z), y = @exp(-a), r = 1.0 / (1.0 + y), low = y * r;
-    const @T w = y / (2.0 + y), q = w * w;
+    """    const @T a = @abs(z), y = @exp(-a), b = 1.0 + y, c = 2.0 + y, one = 1.0 / (b * c);
+    const @T r = one * c, low = y * r, w = y * (one * b), q = w * w;
 """
     + "".join(_series())
     + """    const @T plus = 0.5 * (z + a) + 2.0 * w * s, up = @NEGATIVE(z, low, r);
@@ -230,7 +234,7 @@ def _support(r: Network, kind: _Kind) -> list[str]:
                 body[:start] + kind.select.format(value, limit, then, otherwise) + body[end + 1 :]
             )
     head = f"static inline void softehl_{name}@S(@T z, @T *h, @T *d, @T *e)\n"
-    return [kind.written(_DENSE), kind.written(head) + f"{{\n{body}}}\n"]
+    return [kind.written(_dense()), kind.written(head) + f"{{\n{body}}}\n"]
 
 
 @dataclass(frozen=True)
@@ -314,8 +318,12 @@ class _Sweeps:
         yield f"@T z[{self.widest}], h[{self.units}], d[{self.units}], e[{self.units}];"
         for layer in self.hidden:
             yield from self.affine(layer, "a", "z")
-            call = f"{self.activation}(z[i], &h[u], &d[u], &e[u]);"
+            unseen = layer is self.hidden[-1] and self.r.order > 0
+            value = "unseen" if unseen else "h[u]"
+            call = f"{self.activation}(z[i], &{value}, &d[u], &e[u]);"
+            call = f"{{ @T unseen; {call} (void)unseen; }}" if unseen else call
             yield self.units_of(layer, call)
+        yield "(void)h;"
 
     def affine(self, layer: _Layer, weights: str, into: str) -> Iterator[str]:
         """into = W h + b."""

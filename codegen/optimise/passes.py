@@ -17,6 +17,7 @@ from softehl.codegen.external_function import ExternalFunction
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, ResultIndex
 from softehl.codegen.graph.precise_arithmetic import number
 from softehl.codegen.graph.routines import External
+from softehl.codegen.graph.run_time_arrays import Network
 from softehl.codegen.graph.tensor_functions import lower
 from softehl.codegen.graph.term_reductions import Entry, Reduction
 from softehl.codegen.graph.traversal import (
@@ -75,25 +76,28 @@ def fold(g: Graph, roots: Roots) -> Roots:
 
 
 def calls(g: Graph, roots: Roots) -> Roots:
-    """Values and derivatives by one call: of a C function of the user, of a loop over terms.
+    """Values and derivatives by one call: of a C function, of a loop over terms, of a network.
 
-    The results of a C function of a lower order are the first ones of a higher order; a loop has
-    all results that are asked for.
+    The results of a C function or network of a lower order are the first ones of a higher order; a
+    loop has all results that are asked for.
     """
     roots = _loops(g, roots)
     highest: dict[tuple[ExternalFunction, tuple[Node, ...]], External] = {}
+    networks = {(n.payload, n.args) for n in reachable(roots) if isinstance(n.payload, Network)}
     for n in reachable(roots):
         if isinstance(n.payload, External):
             key = n.payload.function, n.args
             if key not in highest or highest[key].order < n.payload.order:
                 highest[key] = n.payload
-    if not highest:
+    if not highest and not networks:
         return roots
 
     def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
         payload = n.payload
         if isinstance(payload, External):
             payload = highest[payload.function, n.args]
+        if isinstance(payload, Network) and (payload.higher, n.args) in networks:
+            payload = payload.higher
         return g.rebuild(n.op, args, payload)
 
     return rewrite(g, roots, rule)
