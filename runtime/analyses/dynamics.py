@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from softehl.runtime.analyses.equations_of_motion import EquationsOfMotion
+from softehl.log import warn
+from softehl.runtime.analyses.equations_of_motion import EquationsOfMotion, names_of
 from softehl.runtime.analyses.explicit_dynamics import ExplicitMarch
 from softehl.runtime.analyses.initial_state import SMALLEST, initial_state
 from softehl.runtime.analyses.motion import (
@@ -44,6 +45,11 @@ from softehl.runtime.solve.continuation import (
 )
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point, Solution, Status
+
+
+class UnbalancedStart(RuntimeWarning):
+    """A motion starts with unknowns without mass, such as pressures, that are in no equilibrium."""
+
 
 _SUPPORT_STEP = 1e-6  # of a step: the initial velocity of supports is a difference over that
 _CONSISTENT_STEP = 0.1  # of a step: shorter ones find a consistent start, with this error
@@ -163,7 +169,7 @@ def _consistent_state(
     if body.comm.max(float(body.constrained.any())):
         state = _constrained_state(body, state, dt, newton)
     elif body.comm.max(float(body.algebraic(problem).any())):
-        state = replace(state, x=_massless_equilibrium(body, problem, state.x, newton))
+        state = _with_massless_equilibrium(body, problem, state, newton)
     problem = body.at_end(state.ended_step(dt), state.v)
     return replace(state, a=body.initial_accelerations(problem, state.x))
 
@@ -187,15 +193,31 @@ def _constrained_state(
     return replace(state, x=x, v=2.0 * v - later_v)
 
 
-def _massless_equilibrium(
-    body: EquationsOfMotion, problem: Problem, x: Array, newton: Newton
-) -> Array:
-    """Unknowns x, (n,), in which those without mass satisfy their equations."""
+def _with_massless_equilibrium(
+    body: EquationsOfMotion, problem: Problem, state: MotionState, newton: Newton
+) -> MotionState:
+    """The state in which unknowns without mass satisfy their equations.
+
+    Warns where none is found, and returns the state as it is.
+    """
+    x = state.x
     fixed = np.union1d(problem.fixed, np.flatnonzero(body.has_mass))
     massless = replace(problem, fixed=fixed, values=x[fixed])
     with np.errstate(all="ignore"):
         solution = newton.solve(body.comm.distribute(massless), x)
-    return solution.x if solution.converged else x
+    if solution.converged:
+        return replace(state, x=solution.x)
+    names = names_of(body.static_system, body.algebraic(problem))
+    if body.comm.is_root:
+        warn(
+            f"t = {state.t:.6g}: {names} has no mass, and no equilibrium of it was found at the "
+            f"start ({solution.message}), so that it begins with the values of the start: begin "
+            "with a solved state (start=study.solve(...)), or give the unknowns initial values "
+            "near their equilibrium",
+            UnbalancedStart,
+            stacklevel=4,
+        )
+    return state
 
 
 def _backward_euler_step(

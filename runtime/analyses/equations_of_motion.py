@@ -141,7 +141,7 @@ class EquationsOfMotion:
             element_blocks = [changed.get(b.name, b) for b in element_blocks]
         elif integrator is not None and not integrator.damps and comm.max(float(massless.any())):
             raise StudyError(
-                f"{_name_of(system, massless)} is a multiplier, whose error grows in steps of "
+                f"{names_of(system, massless)} is a multiplier, whose error grows in steps of "
                 'method = "newmark" or of rho_inf = 1, which damp nothing: take '
                 '"generalised-alpha" with rho_inf below 1, or "midpoint"'
             )
@@ -296,10 +296,11 @@ def _multipliers(
     return multipliers
 
 
-def _name_of(system: System, dofs: Flags) -> str:
-    """Names of the unknowns among these, (n,)."""
+def names_of(system: System, dofs: Flags) -> str:
+    """Names of the unknowns among these, (n,), of all processes."""
     layout = system.numbering.layout
-    return join_names([repr(name) for name in layout.names if dofs[layout.part(name)].any()])
+    present = [n for n in layout.names if system.comm.max(float(dofs[layout.part(n)].any()))]
+    return join_names(list(map(repr, present)))
 
 
 def _averaged(block: ElementBlock, page: Block | None, multipliers: Flags) -> ElementBlock:

@@ -77,6 +77,11 @@ def march(
         return march_of_first_order(
             definition, integrator, dt=dt, until=until, options=options, **family_arguments
         )
+    if options.record:
+        raise StudyError(
+            f'record = True: a march by "{integrator.name}" has no derivatives, which also fit, '
+            f"objective and in_jax need: allowed are {_methods(of_first_order=True)}"
+        )
     family_arguments = require_arguments(integrator, march_with_inertia, arguments)
     return march_with_inertia(
         definition, integrator, dt=dt, until=until, options=options, **family_arguments
@@ -129,15 +134,20 @@ def _require_no_inertia(integrator: TimeIntegrator, system: System) -> None:
     """Raise StudyError where a page has accelerations."""
     for block in system.blocks.values():
         if block.accelerations:
-            methods = [
-                name
-                for name, kind in INTEGRATORS.items()
-                if not isinstance(kind(), FirstOrderIntegrator)
-            ]
             raise StudyError(
                 f'{block.name!r} has accelerations, method = "{integrator.name}" has none: allowed '
-                "are " + ", ".join(f'"{name}"' for name in methods)
+                f"are {_methods(of_first_order=False)}"
             )
+
+
+def _methods(*, of_first_order: bool) -> str:
+    """Short names of the integrators of an order, for messages."""
+    kinds = INTEGRATORS.items()
+    return ", ".join(
+        f'"{name}"'
+        for name, kind in kinds
+        if isinstance(kind(), FirstOrderIntegrator) is of_first_order
+    )
 
 
 @dataclass(frozen=True)

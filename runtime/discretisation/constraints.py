@@ -70,7 +70,7 @@ class Constraints:
         return Constraints(fixed, values, self.free[numbers], self.group[numbers])
 
     def without(self, numbers: Integers) -> Constraints:
-        """Where these unknowns, and what is tied to them, are none of z."""
+        """Constraints with no z for these unknowns and what is tied to them."""
         constrained: Flags = np.zeros(len(self.free), dtype=bool)
         constrained[self.group[numbers]] = True
         return replace(self, free=self.free & ~constrained[self.group])
@@ -79,7 +79,7 @@ class Constraints:
 
     @cached_property
     def prescribed(self) -> Flags:
-        """Whether an unknown is prescribed, (n,)."""
+        """True for prescribed unknowns, (n,)."""
         flags: Flags = np.zeros(len(self.free), dtype=bool)
         flags[self.fixed] = True
         return flags
@@ -141,7 +141,7 @@ class Constraints:
 
     @cached_property
     def moving(self) -> Flags:
-        """Whether an unknown is one of z, (n,)."""
+        """True for unknowns that are one of z, (n,)."""
         moving = self.free.copy()
         moving[self.slaves] = False
         return moving

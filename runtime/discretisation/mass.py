@@ -55,13 +55,7 @@ def lumped(matrices: Array) -> Array:
 def interpolation(kind: str, nodes: int) -> Cell:
     """The cell of a field on so many (first) nodes of a kind: all, or the corners."""
     cell = CELLS[kind]
-    if nodes == len(cell.nodes):
-        return cell
-    return next(
-        c
-        for c in CELLS.values()
-        if len(c.nodes) == nodes == cell.corners == c.corners and c.dimension == cell.dimension
-    )
+    return cell if nodes == len(cell.nodes) else cell.linear
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from softehl.runtime.analyses.bifurcation import Bifurcation, MissedBifurcations
     from softehl.runtime.analyses.buckling import Buckling
     from softehl.runtime.analyses.callbacks import Series
+    from softehl.runtime.analyses.dynamics import UnbalancedStart
     from softehl.runtime.analyses.homogenisation import Cell, Homogenised
     from softehl.runtime.analyses.motion import EnergyGain, Motion
     from softehl.runtime.analyses.solver_options import SolverOptions
@@ -182,6 +183,7 @@ _PUBLIC = {
     "StudyError": "softehl.runtime.definition.problem_definition",
     "System": "softehl.runtime.equations.system",
     "Table": "softehl.runtime.kernels.tables",
+    "UnbalancedStart": "softehl.runtime.analyses.dynamics",
     "UnstableState": "softehl.runtime.equations.stability",
     "animate": "softehl.runtime.results.plotting",
     "initial_weights": "softehl.runtime.kernels.networks",
@@ -310,6 +312,7 @@ __all__ = [
     "Table",
     "TargetError",
     "TermArray",
+    "UnbalancedStart",
     "UnknownNameError",
     "UnstableState",
     "animate",

@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 
 import softehl
-from softehl import Definition, Model, quadrature
+from softehl import Definition, Model, UnbalancedStart, quadrature
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.study import Study, StudyError
 from tests.runtime.field_pages import mixed
@@ -135,6 +135,37 @@ def test_pressures_need_no_mass() -> None:
         assert np.nanmax(np.abs(states[-1].values("p"))) > 0.1
     with pytest.raises(StudyError, match="p has no mass everywhere"):
         steps(study, method="explicit", **given)
+
+
+@cache
+def valve() -> Definition:
+    """A mass with an unknown q without mass, q^2 = w - 1: none where w < 1."""
+    m = Model("valve", nodes=1, rule=quadrature.point_rule())
+    ((w,),), ((q,),) = m.nodal_unknowns("w"), m.nodal_unknowns("q")
+    ((a,),) = m.rates("w", order=2)
+    m.weak_form([(a + w, w), (q**2 + 1 - w, q)])
+    return m.finish()
+
+
+@pytest.mark.parametrize("w", [2.0, 0.5])
+def test_a_start_without_equilibrium_of_what_has_no_mass_is_not_silent(w: float) -> None:
+    study = Study(Mesh.line(1.0, cells=1))
+    study.add("valve", valve(), on=lambda x: x[:, 0] == 0.0)
+    study.start(w=w, q=0.5)
+    given: dict[str, Any] = {"method": "generalised-alpha", "dt": 1e-3, "until": 1e-3}
+    if w > 1.0:
+        assert last(study, **given).values("q")[0] == pytest.approx(1.0, abs=1e-5)
+        return
+    message = r"t = 0: 'q' has no mass, and no equilibrium of it was found at the start"
+    with pytest.warns(UnbalancedStart, match=message):
+        study.march(**given)
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_a_motion_is_not_recorded(method: str) -> None:
+    message = f'record = True: a march by "{method}" has no derivatives.* "euler", "bdf2"'
+    with pytest.raises(StudyError, match=message):
+        steps(oscillator(), dt=0.1, until=0.2, method=method, record=True)
 
 
 def test_mass_of_a_page_is_that_of_a_density() -> None:
