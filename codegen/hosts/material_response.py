@@ -22,7 +22,7 @@ from softehl.codegen.graph.graph import Node
 from softehl.codegen.graph.traversal import substitute
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.registry import Files, StatesOf
-from softehl.codegen.language import kinematics
+from softehl.codegen.language import kinematics, model_builder
 from softehl.codegen.language.definition import Argument, Definition, functions_of_user
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.language.model import PARENT_NAMES, Model
@@ -80,7 +80,7 @@ class Response:
 
 def arrays_of(law: Law) -> tuple[str, ...]:
     """Names of the curves and networks of a law."""
-    return tuple(a.name for a in _written(law, sp.eye(3))[0].arrays)
+    return tuple(a.name for a in model_builder.arrays_of(_written(law, sp.eye(3))[0]))
 
 
 def is_small_strain(law: Law) -> bool:

@@ -546,11 +546,6 @@ class ModelBuilder:
         self._outputs = Outputs(self._symbols)
         self._functions: dict[str, Node] = {}
 
-    @property
-    def arrays(self) -> tuple[RunTimeArray, ...]:
-        """Run-time arrays that are declared so far."""
-        return tuple(self._arguments.arrays)
-
     def _foreign(self, rule: QuadratureRule, nodes: int) -> str:
         """Words on a rule of another cell than that of the nodes."""
         return cells.foreign(rule, nodes)
@@ -641,3 +636,8 @@ class ModelBuilder:
         )
         self.unroll = True
         return written
+
+
+def arrays_of(model: ModelBuilder) -> tuple[RunTimeArray, ...]:
+    """Run-time arrays that a model has declared so far."""
+    return tuple(model._arguments.arrays)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from softehl import initial_weights
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.sympy_lowering import SUPPORTED
@@ -28,6 +29,8 @@ CALLS: dict[str, tuple[list[float], list[float], dict[str, Any]]] = {
         {"parameters": [2.0, 0.7, 0.5], "point_data": np.array([[0.02]])},
     ),
     "condensed": ([0.0, 2.0], [0.0, 0.3], {"parameters": [2.0]}),
+    "spring_of_data": ([], [1.3], {"parameters": {"energy": ([0, 1, 2, 3], [0, 1, 5, 9])}}),
+    "learned_spring": ([], [0.3], {"parameters": {"W": initial_weights(2, (4, 3), seed=1)}}),
     "fibres": ([], [0.3], {"parameters": {"k": [3.0, 1.0, 2.0], "crimp": [0.0, 0.1, 0.4]}}),
     "damaged_spring": ([], [0.7], {"parameters": [1.3]}),
     "ogden": (SQUARE, MOVED, {"parameters": [1.0, 1.7]}),

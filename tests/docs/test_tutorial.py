@@ -14,7 +14,7 @@ from tests.docs.pages import Block, Reader, blocks
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = (
     *("tutorial.md", "study.md", "fields.md", "contact.md", "modes.md", "dynamics.md"),
-    *("matrix-free.md", "facets.md", "umat.md", "how-to.md"),
+    *("matrix-free.md", "facets.md", "umat.md", "how-to.md", "learned-law.md"),
 )
 TUTORIAL = "\n".join((DOCS / page).read_text(encoding="utf-8") for page in PAGES)
 CHAPTERS = dict(re.findall(r"^## (.+?)\n(.*?)(?=^## |\Z)", TUTORIAL, re.MULTILINE | re.DOTALL))
@@ -24,7 +24,7 @@ LONG = (
     *("Ogden: principal stretches in three dimensions", "A viscoplastic steel"),
     *("Gent: a rubber that locks", "A beam that swings", "Interior penalty"),
     *("Heat: weak forms and rates", "Unknowns of one element"),
-    "Press a rigid sphere into a body?",
+    *("Press a rigid sphere into a body?", "A convex network of two invariants"),
 )
 """Chapters that take 1.5 s and more."""
 
