@@ -217,9 +217,10 @@ def table(name: str, values: Iterable[float], kind: str = "static const double")
 def filled(text: str, substitutions: Mapping[str, object]) -> str:
     """Replace every @key@ of a template; a missing key is a KeyError.
 
-    @finite_numbers@ is a function that several programs need.
+    @finite_numbers@ and @say@ are functions that several programs need.
     """
-    values = {"finite_numbers": template("finite_numbers.c"), **substitutions}
+    common = {"finite_numbers": template("finite_numbers.c"), "say": template("say.f90")}
+    values = {**common, **substitutions}
     return re.sub(r"@(\w+)@", lambda m: str(values[m[1]]), text)
 
 

@@ -16,6 +16,8 @@ from softehl.codegen.abi import Task
 from softehl.codegen.derive.output_entries import Entry
 from softehl.codegen.derive.task_outputs import outputs
 from softehl.codegen.graph.evaluation import State, Walk
+from softehl.codegen.graph.tensor_functions import Kernel
+from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.pipeline import KernelSource
 
@@ -80,12 +82,19 @@ def sample(interface: ElementInterface, kernel: KernelSource, state: State) -> S
 
 
 def _entries(interface: ElementInterface, kernel: KernelSource, task: str) -> list[Entry]:
-    """Outputs of the whole element, also of a kernel that is made of functions of a point."""
+    """Outputs of the whole element, also of a kernel that is made of functions of a point.
+
+    Functions of tensors are printed as routines without a value of their own: their outputs are
+    those before the passes.
+    """
     if task not in kernel.functions:
         return []
     function = kernel.functions[task]
-    at_point = function.printer == "points"
-    return outputs(interface.definition, task) if at_point else function.best.entries
+    printed = function.best.entries
+    below = reachable([x.node for x in printed])
+    if function.printer == "points" or any(isinstance(n.payload, Kernel) for n in below):
+        return outputs(interface.definition, task)
+    return printed
 
 
 def samples(

@@ -29,16 +29,7 @@ contains
       none, predef, 1, lflags, n, none, 0, pnewdt, zero, 0, 1d0)
   end subroutine
 
-  subroutine say(what, error, limit)
-    character(*), intent(in) :: what
-    real(real8), intent(in) :: error, limit
-    character(6) :: word
-    word = 'ok'
-    if (.not. error <= limit) word = 'FAILED'
-    if (.not. error <= limit) failures = failures + 1
-    print '(a36, 1x, es7.1e2, 2x, a)', what // repeat(' ', 36), error, trim(word)
-  end subroutine
-
+@say@
   subroutine check_samples()
     integer :: file, n, nodes, dim, nprops, nsvars, outputs, count, s, j
     real(real8) :: pnewdt, dt, worst(4), largest(3)

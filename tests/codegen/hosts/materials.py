@@ -28,6 +28,14 @@ def ogden_1(m: Material) -> None:
 
 
 @softehl.material
+def hencky(m: Material) -> None:
+    """Hencky's energy of the logarithmic strain."""
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    e = m.define("e", m.log(m.F.T * m.F) / 2)
+    m.energy(mu * (e * e).trace() + K / 2 * e.trace() ** 2)
+
+
+@softehl.material
 def fluid(m: Material) -> None:
     """A law without energy: its modulus is not symmetric."""
     k, a = m.parameters(k="stiffness [MPa]", a="anisotropy")

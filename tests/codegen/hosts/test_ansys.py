@@ -16,7 +16,7 @@ from softehl.codegen.hosts.ansys import ORDER
 from softehl.codegen.hosts.material_response import VOIGT, Measure, response
 from softehl.codegen.language.material import Law
 from softehl.runtime.arrays import Array
-from tests.codegen.hosts.materials import fluid, hooke, j2, neo, ogden_1
+from tests.codegen.hosts.materials import fluid, hencky, hooke, j2, neo, ogden_1
 from tests.codegen.hosts.random_pages import FEW, laws
 from tests.codegen.hosts.test_material_history import by_study, creeping, settled
 from tests.codegen.hosts.test_materials import BULK, MU, F, values
@@ -34,6 +34,7 @@ STRICT = "-O1 -Wall -Wextra -Werror -Wno-psabi"
         pytest.param(fluid, marks=pytest.mark.slow),
         pytest.param(hooke, marks=pytest.mark.slow),
         pytest.param(ogden_1, marks=pytest.mark.slow),
+        pytest.param(hencky, marks=pytest.mark.slow),
     ],
     ids=lambda law: law.name,
 )

@@ -25,7 +25,7 @@ from softehl.codegen.tools import cli, host_files
 from softehl.codegen.tools.model_loader import definitions
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.runtime.arrays import Array
-from tests.codegen.hosts.materials import fluid, hooke, neo, ogden_1, turned
+from tests.codegen.hosts.materials import fluid, hencky, hooke, neo, ogden_1, turned
 from tests.codegen.hosts.random_pages import FEW, laws
 from tests.codegen.hosts.workshop import errors, folder, made
 
@@ -85,7 +85,13 @@ def test_the_cauchy_measure_is_its_push_forward() -> None:
 @needs_fortran
 @pytest.mark.parametrize(
     "law",
-    [neo, pytest.param(ogden_1, marks=pytest.mark.slow), fluid, hooke],
+    [
+        neo,
+        pytest.param(ogden_1, marks=pytest.mark.slow),
+        pytest.param(hencky, marks=pytest.mark.slow),
+        fluid,
+        hooke,
+    ],
     ids=lambda law: law.name,
 )
 def test_a_cell_of_umat_is_the_page(law: Law, tmp_path: Path) -> None:
@@ -102,7 +108,9 @@ def test_a_cell_of_umat_is_the_page(law: Law, tmp_path: Path) -> None:
 
 @needs_fortran
 @pytest.mark.parametrize(
-    "law", [neo, pytest.param(hooke, marks=pytest.mark.slow)], ids=lambda law: law.name
+    "law",
+    [neo, *(pytest.param(law, marks=pytest.mark.slow) for law in (hooke, hencky))],
+    ids=lambda law: law.name,
 )
 def test_a_cell_of_calculix_is_the_page(law: Law, tmp_path: Path) -> None:
     folder(law, "calculix", tmp_path)
@@ -126,7 +134,7 @@ def test_random_laws(law: Law, host: str, tmp_path_factory: pytest.TempPathFacto
     assert cut == 0
 
 
-@pytest.mark.parametrize("law", [neo, fluid, hooke], ids=lambda law: law.name)
+@pytest.mark.parametrize("law", [neo, fluid, hooke, hencky], ids=lambda law: law.name)
 def test_a_law_in_c_has_stress_and_modulus(law: Law, tmp_path: Path) -> None:
     done = made(folder(law, "c", tmp_path))
     assert done.returncode == 0, done.stdout + done.stderr
