@@ -139,6 +139,7 @@ class Study:
         source: Source = None,
         *,
         material: Source = None,
+        element: str | None = None,
         on: On | Sequence[Sequence[int]] = None,
         cells: str | None = None,
         model: str | None = None,
@@ -162,6 +163,9 @@ class Study:
         material : str, Path or Law, optional
             Instead of `source`: a stress law, for a body of it. A file, a function, or the name of
             a law that ships, such as "neo_hooke".
+        element : str, optional
+            Instead of `source`: an element of the library, such as "truss"; `softehl elements`
+            lists them.
         on : str, callable or array (n, k), optional
             A side; a page of one node has an element at each of its nodes. "interior" are the
             facets between cells. An array gives the elements themselves by their node numbers.
@@ -201,7 +205,9 @@ class Study:
         add_block(
             self._definition,
             name,
-            KernelOrigin.of(name, source, material=material, model=model, geometry=geometry),
+            KernelOrigin.of(
+                name, source, material=material, element=element, model=model, geometry=geometry
+            ),
             form_of(name, shared, called, along, rule, constant),
             on=elements_on(name, on),
             cells=cells,

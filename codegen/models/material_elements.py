@@ -82,6 +82,7 @@ def law(name: str) -> Law:
     match = next((LAWS[key] for key in LAWS if key.replace("_", "") == letters), None)
     if match is None:
         raise ValueError(
-            f"no material is called {name!r}; allowed: {', '.join(LAWS)}, or a file, my_law.py"
+            f"no material is called {name!r}; allowed: {', '.join(LAWS)}, a law of "
+            "the library (softehl elements lists them), or a file, my_law.py"
         )
     return match

@@ -311,12 +311,14 @@ def _file_key(texts: Mapping[str, str], options: Sequence[str] = ()) -> str:
 
 
 _CODEGEN = Path(__file__).parents[1]
+LIBRARY = _CODEGEN / "models" / "library"
 
 
 @cache
 def generator() -> str:
     """Digest of the generator: its text and the versions of SymPy and mpmath."""
-    texts = [p.read_text(encoding="utf-8") for p in sorted(_CODEGEN.rglob("*.py"))]
+    paths = sorted(p for p in _CODEGEN.rglob("*.py") if p.parent != LIBRARY)  # models of their own
+    texts = [p.read_text(encoding="utf-8") for p in paths]
     return store.digest([*texts, *(version(p) for p in ("sympy", "mpmath"))])
 
 

@@ -28,11 +28,23 @@ class KernelOrigin:
 
     @classmethod
     def of(
-        cls, block: str, source: Source, *, material: Source, model: str | None, geometry: str
+        cls,
+        block: str,
+        source: Source,
+        *,
+        material: Source,
+        element: str | None,
+        model: str | None,
+        geometry: str,
     ) -> KernelOrigin:
-        """Return the origin of a page or a stress law.  Raises StudyError unless one is given."""
-        if (source is None) == (material is None):
-            raise StudyError(f"{block!r}: give a page or material=..., one of them")
+        """Return the origin of a page, an element of the library or a stress law.
+
+        Raises StudyError unless one is given.
+        """
+        if [source, material, element].count(None) != 2:
+            raise StudyError(f"{block!r}: give a page, element=... or material=..., one of them")
+        if element is not None:
+            return cls(page_loader.element_file(element), model, geometry, law=False)
         if material is None:
             return cls(source, model, geometry, law=False)
         return cls(material, model, geometry, law=True)

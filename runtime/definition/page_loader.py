@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
@@ -25,5 +26,15 @@ class PageLoader(Protocol):
         ...
 
 
+class LibraryEntry(Protocol):
+    """Function that finds the file of an element of the library."""
+
+    def __call__(self, name: str) -> Path:
+        """Return the model file; raises a SoftehlError for a name that is not there."""
+        ...
+
+
+element_file: LibraryEntry
+"""The package sets it when it is imported."""
 load_page: PageLoader
 """`softehl.load_kernel`; the package sets it when it is imported."""

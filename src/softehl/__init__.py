@@ -419,6 +419,17 @@ def load_kernel(
     where = (() if cell is None else (cell,), geometry or "", materials)
     if isinstance(source, str) and not source.endswith(".py") and not folder_given:
         if materials:
+            from softehl.codegen.tools import library
+
+            if library.has(source, "material"):
+                return load_kernel(
+                    library.entry(source, "material").path,
+                    name,
+                    cell=cell,
+                    geometry=geometry,
+                    materials=True,
+                    derivatives=derivatives,
+                )
             with with_sympy():
                 from softehl.codegen.tools.kernel_cache import of_law
 
@@ -443,6 +454,15 @@ def load_kernel(
 from softehl.runtime.definition import page_loader  # noqa: E402, after __path__ is complete
 
 page_loader.load_page = load_kernel  # the runtime has no compiler
+
+
+def _element_file(name: str) -> Path:
+    from softehl.codegen.tools.library import entry
+
+    return entry(name, "element").path
+
+
+page_loader.element_file = _element_file
 
 from softehl.runtime.kernels import page_evaluator  # noqa: E402
 

@@ -168,6 +168,19 @@ def _commands() -> "click.Group":
             )
 
     @commands.command()
+    @click.option("--show", metavar="NAME", help="Print the model file of an element or law.")
+    def elements(show: str | None) -> int:
+        """List the library: elements and laws with parameters, source and benchmark."""
+        from softehl.cases.harness.errors import BadInput
+        from softehl.codegen.tools.library import LibraryError, print_list, text_of
+
+        try:
+            click.echo(text_of(show), nl=False) if show else print_list()
+        except LibraryError as error:
+            raise BadInput(str(error)) from None
+        return 0
+
+    @commands.command()
     def kernels() -> int:
         """Show what the kernels cost, and which compiled library of them is used."""
         from softehl.cases.harness.errors import BadInput

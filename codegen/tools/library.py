@@ -1,0 +1,148 @@
+"""Library of elements and laws by name: one model file each, with its source and benchmark.
+
+A file NAME.py defines the page, element or material NAME. The first line of its docstring is a
+summary; lines `Cells:`, `Source:` and `Benchmark:` follow. A user may copy a file and change it.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from softehl.errors import SoftehlError
+
+FOLDER = Path(__file__).resolve().parents[1] / "models" / "library"
+LONGEST = 80
+"""Lines of a file at most."""
+_DECLARATIONS = ("vector", "scalar", "nodal_unknowns", "internal", "unknown")
+
+
+class LibraryError(SoftehlError, ValueError):
+    """The library has no such entry; the message names those that there are."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Element or law of the library.
+
+    kind: "element" or "material". summary, cells, source, benchmark: of its docstring. unknowns:
+    names of its unknowns. parameters: name -> meaning with unit, of data and arrays too.
+    """
+
+    name: str
+    path: Path
+    kind: str
+    summary: str
+    cells: str
+    source: str
+    benchmark: str
+    unknowns: tuple[str, ...]
+    parameters: dict[str, str]
+
+
+@cache
+def entries() -> dict[str, Entry]:
+    """All entries by name; the files are read, not run."""
+    paths = sorted(FOLDER.glob("[a-z]*.py"))
+    return {path.stem: _entry(path) for path in paths}
+
+
+def entry(name: str, kind: str) -> Entry:
+    """The entry of a name and kind; capitals, hyphens and spaces do not count.
+
+    Raises LibraryError.
+    """
+    plain = "_".join(name.lower().replace("-", " ").replace("_", " ").split())
+    found = entries().get(plain)
+    if found is not None and found.kind == kind:
+        return found
+    names = [e.name for e in entries().values() if e.kind == kind]
+    close = difflib.get_close_matches(plain, names, n=2)
+    hint = f"did you mean {' or '.join(close)}? " if close else ""
+    if found is not None:
+        hint = f"{plain} is a{'n' if found.kind == 'element' else ''} {found.kind}; "
+    raise LibraryError(f"no {kind} {name!r} in the library: {hint}softehl elements lists them")
+
+
+def has(name: str, kind: str) -> bool:
+    """Whether the library has an entry of this name and kind."""
+    try:
+        return bool(entry(name, kind))
+    except LibraryError:
+        return False
+
+
+def text_of(name: str) -> str:
+    """The model file of an element or law, by its name.  Raises LibraryError."""
+    kind = "material" if has(name, "material") else "element"
+    return entry(name, kind).path.read_text(encoding="utf-8")
+
+
+def print_list() -> None:
+    """Print all entries, one below the other."""
+    for kind, call in (("element", "element"), ("material", "material")):
+        print(f"{kind}s: study.add(name, {call}=...)\n")
+        for e in (e for e in entries().values() if e.kind == kind):
+            print(f"{e.name}: {e.summary}")
+            rows = {
+                "cells": e.cells,
+                "unknowns": ", ".join(e.unknowns),
+                "parameters": "; ".join(f"{k}, {v}" for k, v in e.parameters.items()),
+                "source": e.source,
+                "benchmark": e.benchmark,
+            }
+            for label, text in rows.items():
+                if text:
+                    print(f"    {label + ':':<12} {text}")
+            print()
+
+
+def _entry(path: Path) -> Entry:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    doc = (ast.get_docstring(tree) or "").strip()
+    summary, _, rest = doc.partition("\n")
+    notes = {"Cells": "", "Source": "", "Benchmark": ""}
+    last = ""
+    for line in rest.splitlines():
+        label, colon, text = line.partition(":")
+        if colon and label in notes:
+            last, notes[label] = label, text.strip()
+        elif last and line.strip():
+            notes[last] += f" {line.strip()}"
+        else:
+            last = ""
+    function = next(n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == path.stem)
+    decorators = " ".join(ast.unparse(d) for d in function.decorator_list)
+    unknowns, parameters = _arguments(tree)
+    return Entry(
+        path.stem,
+        path,
+        "material" if "material" in decorators else "element",
+        summary,
+        notes["Cells"],
+        notes["Source"],
+        notes["Benchmark"],
+        unknowns,
+        parameters,
+    )
+
+
+def _arguments(tree: ast.Module) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Names of unknowns, and arguments with their meanings, by the calls of a page."""
+    unknowns, parameters = [], {}
+    for node in ast.walk(tree):
+        if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
+            continue
+        texts = [a.value for a in node.args if isinstance(a, ast.Constant)]
+        if node.func.attr in _DECLARATIONS:
+            unknowns += [t for t in texts if isinstance(t, str)]
+        elif node.func.attr in ("parameters", "data"):
+            for k in node.keywords:
+                if k.arg and isinstance(k.value, ast.Constant):
+                    parameters[k.arg] = str(k.value.value)
+        elif node.func.attr in ("array", "table"):
+            parameters |= {t: "several numbers" for t in texts[:1] if isinstance(t, str)}
+    return tuple(dict.fromkeys(unknowns)), parameters

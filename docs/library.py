@@ -1,0 +1,75 @@
+"""Write docs/library.md: entries of the library, their parameters, published numbers and ours.
+
+python docs/library.py            all numbers anew (minutes)
+python docs/library.py NAME ...   those of some entries; others stay as they are on the page
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+
+from softehl.codegen.tools.library import entries  # noqa: E402
+from tests.library.every import BENCHMARKS  # noqa: E402
+
+PAGE, NUMBERS = HERE / "library.md", HERE / "library.json"
+INTRODUCTION = """# The library of elements and laws
+
+```python
+study.add("bar", element="truss", E=210e3, A=20.0)
+study.add("body", material="hencky", mu=0.4, kappa=2.0)
+```
+
+An element or law of the library is a model file of at most 80 lines, derived and compiled at its
+first use. `softehl elements` lists names, unknowns and parameters with units. `softehl elements
+--show truss` prints the file: copy it as the start of a page of your own, or give it to `softehl
+generate` for another program. Every entry is compared with a number from elsewhere; the tests run
+the same comparisons.
+
+"""
+
+
+def main(names: list[str]) -> None:
+    """Compute the numbers of some entries, all if none is named, and write the page."""
+    numbers = json.loads(NUMBERS.read_text(encoding="utf-8")) if NUMBERS.exists() else {}
+    for b in BENCHMARKS:
+        if not names or b.entry in names or b.problem not in numbers:
+            numbers[b.problem] = float(f"{b.run():.8g}")
+            print(f"{b.entry}: {b.problem}: {numbers[b.problem]:.6g} ({b.published:.6g})")
+    known = {b.problem for b in BENCHMARKS}
+    numbers = {problem: v for problem, v in sorted(numbers.items()) if problem in known}
+    NUMBERS.write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(INTRODUCTION + "\n".join(_sections(numbers)), encoding="utf-8")
+
+
+def _sections(numbers: dict[str, float]) -> list[str]:
+    lines = []
+    for kind, title in (("element", "Elements"), ("material", "Laws")):
+        rows = [e for e in entries().values() if e.kind == kind]
+        lines += [f"## {title}", "", "| name | what it is | cells | parameters | lines | source |"]
+        lines += ["|---|---|---|---|---|---|"]
+        for e in rows:
+            length = len(e.path.read_text(encoding="utf-8").splitlines())
+            parameters = "; ".join(f"`{k}` {v}" for k, v in e.parameters.items())
+            cells = e.cells or "any"
+            lines.append(
+                f"| `{e.name}` | {e.summary} | {cells} | {parameters} | {length} | {e.source} |"
+            )
+        lines.append("")
+    lines += ["## Published numbers", "", "| entry | problem | published | ours | error | source |"]
+    lines += ["|---|---|---|---|---|---|"]
+    for b in BENCHMARKS:
+        value = numbers[b.problem]
+        lines.append(
+            f"| `{b.entry}` | {b.problem} | {b.published:.6g} | {value:.6g} | "
+            f"{b.error(value):.1e} | {b.source} |"
+        )
+    return [*lines, ""]
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

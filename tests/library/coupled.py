@@ -1,0 +1,7 @@
+"""Benchmarks of elements of coupled fields and fluids."""
+
+from __future__ import annotations
+
+from tests.library.benchmark import Benchmark
+
+BENCHMARKS: list[Benchmark] = []

@@ -1,0 +1,10 @@
+"""All benchmarks of the library."""
+
+from tests.library import coupled, laws, solids, structures
+
+BENCHMARKS = [
+    *structures.BENCHMARKS,
+    *solids.BENCHMARKS,
+    *laws.BENCHMARKS,
+    *coupled.BENCHMARKS,
+]

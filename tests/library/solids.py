@@ -1,0 +1,7 @@
+"""Benchmarks of elements of solids."""
+
+from __future__ import annotations
+
+from tests.library.benchmark import Benchmark
+
+BENCHMARKS: list[Benchmark] = []

@@ -1,0 +1,61 @@
+"""The library: every entry has a page, a source and a published number that it reaches."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from softehl import Mesh, Study, StudyError
+from softehl.codegen.tools.library import LONGEST, LibraryError, entries, entry
+from tests.library.benchmark import Benchmark
+from tests.library.every import BENCHMARKS
+
+PAGE = (Path(__file__).parents[2] / "docs" / "library.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "benchmark",
+    [
+        pytest.param(b, id=f"{b.entry}-{k}", marks=[pytest.mark.slow] if b.slow else [])
+        for k, b in enumerate(BENCHMARKS)
+    ],
+)
+def test_published_numbers(benchmark: Benchmark) -> None:
+    value = benchmark.run()
+    assert benchmark.error(value) <= benchmark.tolerance, (value, benchmark.published)
+
+
+def test_every_entry_is_short_documented_and_has_a_number() -> None:
+    for e in entries().values():
+        assert len(e.path.read_text(encoding="utf-8").splitlines()) <= LONGEST, e.name
+        assert e.summary.endswith("."), e.name
+        assert e.source, e.name
+        assert e.benchmark, e.name
+        assert e.kind == "material" or e.cells, e.name
+        assert all(re.search(r"\w", meaning) for meaning in e.parameters.values()), e.name
+    assert {b.entry for b in BENCHMARKS} == set(entries())
+
+
+def test_the_page_lists_every_entry_and_number() -> None:
+    for e in entries().values():
+        assert f"`{e.name}`" in PAGE, f"{e.name} is missing: python docs/library.py"
+    for b in BENCHMARKS:
+        assert b.problem in PAGE, f"{b.problem} is missing: python docs/library.py"
+
+
+def test_a_wrong_number_is_seen() -> None:
+    b = BENCHMARKS[0]
+    assert b.error(b.published * (1 + 2 * b.tolerance)) > b.tolerance
+
+
+def test_names_that_are_not_there() -> None:
+    assert entry("Hencky", "material").name == "hencky"
+    with pytest.raises(LibraryError, match=r"no element 'trus'.*did you mean truss"):
+        entry("trus", "element")
+    with pytest.raises(LibraryError, match="hencky is a material"):
+        entry("hencky", "element")
+    study = Study(Mesh.rectangle(1, 1, cells=(1, 1)))
+    with pytest.raises(StudyError, match=r"give a page, element=\.\.\. or material=\.\.\., one"):
+        study.add("b", element="truss", material="hooke")
