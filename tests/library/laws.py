@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from softehl import Mesh, Study
@@ -10,7 +12,7 @@ from tests.library.benchmark import Benchmark
 BENCHMARKS: list[Benchmark] = []
 
 
-def uniaxial(material: str, stretch: float, steps: int = 4, **parameters: float) -> float:
+def uniaxial(material: str, stretch: float, steps: int = 4, **parameters: Any) -> float:
     """Nominal stress of a bar that is stretched and free at its sides."""
     study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
     study.add("bar", material=material, **parameters)
