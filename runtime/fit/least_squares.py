@@ -349,7 +349,7 @@ class LeastSquares:
     def _covariance(
         self, J: Array, curvature: Array | None, residuals: Array, rates: Array
     ) -> tuple[Array, str]:
-        """How the errors of measurements become errors of the inputs, to first order, (k, k).
+        """Covariance of the inputs by first-order propagation of the measurements' errors, (k, k).
 
         curvature: the Hessian H, None for J^T J. The inputs move by -H^-1 J^T e with errors e of
         the measurements: s^2 H^-1 J^T J H^-1, where s^2 is 1 with given deviations, else the

@@ -404,7 +404,7 @@ class NodeCoordinates:
             yield PrescribedSeeds(dofs[mask], self.targets[nodes], rates)
 
     def displacement(self, seed: Array, nodes: Integers) -> Array:
-        """How nodes move with the components, (n, dim)."""
+        """Displacements (n, dim) of nodes with the components."""
         targets = self.targets[nodes]
         moved: Array = np.where(targets >= 0, seed[targets], 0.0)[:, None] * self.directions[nodes]
         return moved
@@ -438,7 +438,7 @@ def _conditions(
 
 
 def displacement(moves: Sequence[Move], nodes: Integers) -> Array:
-    """How nodes move with all inputs, (n, dim); zeros where none moves them."""
+    """Displacements (n, dim) of nodes with all inputs; zeros where none moves them."""
     parts = [
         m.item.displacement(m.seed, nodes) for m in moves if isinstance(m.item, NodeCoordinates)
     ]
