@@ -26,12 +26,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from softehl.codegen import external_function
-from softehl.codegen.abi import DESIGN, ROLLED, Target, Task, derivative_task
+from softehl.codegen.abi import DESIGN, ROLLED, Target, TargetError, Task, derivative_task
 from softehl.codegen.derive import point_outputs, potential_structure, task_outputs
 from softehl.codegen.derive.output_entries import Entry, replace_values
 from softehl.codegen.derive.potential_structure import Structure
 from softehl.codegen.derive.task_outputs import Variant
 from softehl.codegen.emit import (
+    c_printer,
     c_routines,
     c_source,
     simd_kernel,
@@ -108,6 +109,11 @@ class KernelSource:
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
     """Compile all kernels of one model; `codegen.abi` describes the targets."""
+    if target is Target.UFCX and definition.term_history:
+        raise TargetError(
+            f"{definition.name} has history of each term, {definition.term_history[0].name}: "
+            "target ufcx has no place for it, use simd"
+        )
     made = _compiled(definition, target)
     sources = {
         f"{f.symbol}.c": f.source() for f in functions_of_user(definition).values() if f.text
@@ -192,7 +198,7 @@ def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
         texts = [functions[t].text for t in some]
         called = dict.fromkeys(r for t in some for r in functions[t].routines)
         routines = simd_routines.texts(layout.site, called)
-        preamble = simd_printer.wrappers("".join([*routines, *texts]))
+        preamble = [*_types(d), *simd_printer.wrappers("".join([*routines, *texts]))]
         layouts = [layout, *([layout.at_centroid()] if layout.form.centroid else [])]
         tables = [cell_constants.used(each, "".join(texts)) for each in layouts]
         preamble += [*routines, *dict.fromkeys(table for some in tables for table in some)]
@@ -247,8 +253,13 @@ def _file(d: Definition, functions: Sequence[Function], *, single: bool) -> str:
     """The C file of some functions, with the routines that they call. single: with one lane."""
     routines = simd_routines.texts(d, dict.fromkeys(r for f in functions for r in f.routines))
     called = "".join([*routines, *(f.text for f in functions)])
-    preamble = simd_printer.wrappers(called) + routines
+    preamble = [*_types(d), *simd_printer.wrappers(called), *routines]
     return c_source.source(d, [f.text for f in functions], preamble, single=single)
+
+
+def _types(d: Definition) -> list[str]:
+    """Types of C that routines of a model need."""
+    return [c_printer.TERMS] if d.term_history else []
 
 
 def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Function:
@@ -278,7 +289,7 @@ def _attempts(d: Definition, task: str, alternatives: Sequence[Variant]) -> Iter
     A model may have decided (`Definition.unroll`), or the task does.  A loop over shape functions
     stands inside the one over the points, which stays.
     """
-    fixed = False if task in ROLLED or d.interpolated else d.unroll
+    fixed = False if task in ROLLED or d.interpolated or d.term_history else d.unroll
     fewest = 0
     if not fixed:
         looped = [_attempt(d, variant, unrolled=False) for variant in alternatives]

@@ -26,7 +26,7 @@ def tasks(d: Definition) -> list[str]:
     offered: list[str] = [Task.RESIDUAL, Task.TANGENT]
     if d.conservative:
         offered.insert(0, Task.ENERGY)
-    if d.fields:
+    if d.fields or d.term_updates:
         offered.append(Task.FIELDS)
     if d.product:
         offered.append(Task.PRODUCT)
@@ -47,6 +47,11 @@ class Variant:
     entries: list[Entry]
 
 
+def _at_points(d: Definition) -> list[Node]:
+    """Fields, then new history of terms, whose routines write it themselves."""
+    return [*(n for _, n in d.fields), *d.term_updates]
+
+
 def outputs(d: Definition, task: str) -> list[Entry]:
     """Output nodes of a task, before any pass: the first of its `variants`."""
     return next(variants(d, task, structure_of(d))).entries
@@ -62,10 +67,10 @@ def variants(d: Definition, task: str, structure: Structure | None) -> Iterator[
     if task in ADJOINT:
         yield Variant("reverse, over forward, over reverse", _adjoint_rates(d, task))
     elif task == Task.FIELDS_RATE:
-        values = [Entry(Slot(False, k), None, n) for k, (_, n) in enumerate(d.fields)]
+        values = [Entry(Slot(False, k), None, n) for k, n in enumerate(_at_points(d))]
         yield Variant("along a variation", _rates(d, task, values))
     elif not is_differentiated(task):
-        nodes = [d.potential] if task == Task.ENERGY else [n for _, n in d.fields]
+        nodes = [d.potential] if task == Task.ENERGY else _at_points(d)
         yield Variant(
             "none, the page writes it down",
             [Entry(Slot(False, k), None, n) for k, n in enumerate(nodes)],
@@ -189,6 +194,9 @@ def argument_seeds(d: Definition) -> dict[Node, Node]:
         value = g.input("point data", k, varying=varying)
         seeds[value] = g.input("point data", count + k, varying=varying)
     seeds |= {g.input("arrays", k): g.one for k in range(len(d.arrays))}
+    for k, varying in product(range(len(d.term_history)), (False, True)):
+        if d.point_rates:
+            seeds[g.input("term history", k, varying=varying)] = g.one
     return seeds
 
 

@@ -8,7 +8,7 @@ from softehl.codegen.emit.c_printer import (
     design_width,
     direction_expression,
     dofs_expression,
-    point_width,
+    point_values_expression,
 )
 from softehl.codegen.language.definition import Definition
 
@@ -21,7 +21,7 @@ def widths(d: Definition, task: str) -> dict[str, str]:
     size = dofs_expression(d)
     along = direction_expression(d, task) or "0"
     values = {abi.Task.ENERGY: "1"}
-    values |= {t: f"({point_width(d, t)} * points)" for t in abi.AT_POINTS}
+    values |= {t: f"({point_values_expression(d, t)} * points)" for t in abi.AT_POINTS}
     values[abi.Task.ADJOINT_RATE] = str(design_width(d) + len(d.unknowns))
     return {
         "coordinates": str(d.coordinate_width),

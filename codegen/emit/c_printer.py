@@ -164,6 +164,7 @@ _ARRAYS = {
     "interpolated": "p{}",
     "interpolated direction": "t{}",
     "arrays": "0.0",
+    "term history": "0.0",
 }
 
 _LONG = 64
@@ -188,6 +189,8 @@ class Printer:
     """Lines of one function body; `kind` is the type of a value, `output` the name of an array."""
 
     kind, zero, output = "double", "0.0", "{}"
+    terms = "terms"
+    """Pointer to the places of history of terms."""
 
     def __init__(self, definition: Definition) -> None:
         self.d = definition
@@ -266,7 +269,7 @@ class Printer:
         operands = ", ".join(self.ref(a) for a in n.args) or "0.0"
         name = f"{abi.PREFIX}_{self.d.name}_{routine.name}"
         self.line(depth, f"double {self.fresh(n)}[{routine.outputs}];")
-        arrays = "parameters, " if self.d.arrays else ""
+        arrays = array_operands(self.d, self.terms)
         self.line(
             depth, f"failed |= {name}({arrays}(const double[]){{{operands}}}, {self.ref(n)});"
         )
@@ -332,6 +335,57 @@ def point_width(d: Definition, task: str) -> int:
 
 def data_expression(d: Definition) -> str:
     """Data of one element, those of its points included."""
-    if not d.point_data:
+    if not d.point_data and not d.term_history:
         return str(len(d.data))
-    return f"({len(d.data)} + {len(d.point_data)} * points)"
+    return f"({len(d.data)} + {point_expression(d)} * points)"
+
+
+def terms_expression(d: Definition) -> str:
+    """Numbers of all history of terms of one point; empty where there is none."""
+    return " + ".join(f"(ptrdiff_t)parameters[{length_place(d, h.array)}]" for h in d.term_history)
+
+
+def length_place(d: Definition, array: int) -> int:
+    """Place of the length of a run-time array in the parameters."""
+    return len(d.parameters) + abi.ARRAY_ENTRIES * array + 1
+
+
+def point_expression(d: Definition) -> str:
+    """Data of one point."""
+    if not d.term_history:
+        return str(len(d.point_data))
+    times = 2 if d.point_rates else 1
+    return f"({len(d.point_data)} + {times} * ({terms_expression(d)}))"
+
+
+def fields_expression(d: Definition) -> str:
+    """Fields of one point, with the new history of terms."""
+    return f"({len(d.fields)} + {terms_expression(d)})" if d.term_history else str(len(d.fields))
+
+
+def point_values_expression(d: Definition, task: str) -> str:
+    """Values at a point of a task whose values are those of points, new history of terms too."""
+    plain = task == abi.Task.POINT_ADJOINT_RATE or not d.term_history
+    return str(point_width(d, task)) if plain else fields_expression(d)
+
+
+def array_operands(d: Definition, terms: str = "terms") -> str:
+    """First operands of a call of a routine: where run-time arrays and history of terms stand."""
+    return ("parameters, " if d.arrays else "") + (f"{terms}, " if d.term_history else "")
+
+
+def array_arguments(d: Definition) -> str:
+    """First arguments of a routine in its prototype."""
+    terms = "const softehl_terms *terms, " if d.term_history else ""
+    return ("const double *restrict parameters, " if d.arrays else "") + terms
+
+
+TERMS = """/* History of terms of a point, one number for each, of the first lane: where it is read
+   and where new values are written, and the distance of the next lane. */
+typedef struct {
+    const double *read;
+    ptrdiff_t read_step;
+    double *write;
+    ptrdiff_t write_step;
+} softehl_terms;
+"""

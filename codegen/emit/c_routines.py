@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 
 from softehl.codegen.emit import array_routines, tensor_routines, term_loops
-from softehl.codegen.emit.c_printer import Printer, number
+from softehl.codegen.emit.c_printer import Printer, array_arguments, array_operands, number
 from softehl.codegen.emit.code_motion import schedule
 from softehl.codegen.external_function import LOWEST_ADDRESS
 from softehl.codegen.graph.divided_difference import Quotient, SecondQuotient
@@ -188,16 +188,14 @@ def _text(d: Definition, r: Routine) -> list[str]:
 def _signature(d: Definition, r: Routine) -> str:
     name = f"softehl_{d.name}_{r.name}"
     if d.arrays:
-        return (
-            f"static int {name}(\n    const double *restrict parameters, const double *restrict p, "
-            "double *restrict s)\n"
-        )
+        arguments = f"{array_arguments(d)}const double *restrict p, double *restrict s"
+        return f"static int {name}(\n    {arguments})\n"
     return f"static int {name}(const double *restrict p, double *restrict s)\n"
 
 
 def arrays_unused(d: Definition) -> str:
     """Statement for a routine that may read no array of a model with some."""
-    return "    (void)parameters;\n" if d.arrays else ""
+    return "".join(f"    (void){name};\n" for name in array_operands(d).split(", ")[:-1])
 
 
 class Body:
@@ -312,7 +310,7 @@ static int {name}(int order, const double *restrict p, double *restrict s)
 def _isotropic(d: Definition, r: Isotropic) -> list[str]:
     body = Body(d, d.graph, derivatives_of_energy(d.graph, r), Printer(d))
     name = f"softehl_{d.name}_{r.name}_of_eigenvalues"
-    arrays, head = ("parameters, ", "const double *restrict parameters, ") if d.arrays else ("", "")
+    arrays, head = array_operands(d), array_arguments(d)
     local = f"""/* {r.name}: {_CONTENT[r.order]} by the eigenvalues */
 static int {name}(
     {head}const double *restrict s, const double *restrict p, double *restrict w)

@@ -12,7 +12,16 @@ from collections.abc import Iterable, Sequence
 from softehl.codegen import abi
 from softehl.codegen.derive.output_entries import Entry, Slot
 from softehl.codegen.emit.batch_functions import functions, widths
-from softehl.codegen.emit.c_printer import Printer, design_width, dofs_expression, point_width
+from softehl.codegen.emit.c_printer import (
+    Printer,
+    design_width,
+    dofs_expression,
+    fields_expression,
+    point_expression,
+    point_values_expression,
+    point_width,
+    terms_expression,
+)
 from softehl.codegen.emit.code_motion import If, Loop, Same, Schedule, Statement, flat
 from softehl.codegen.emit.instruction_scheduling import ADDITIONS
 from softehl.codegen.emit.simd_printer import LanePrinter
@@ -126,6 +135,10 @@ class _Group:
         p.read(plan, [x.node for x in self.entries], self.stores.once())
         if self.fallible:
             p.line(1, "M failed = softehl_mask(0);")
+        if p.d.term_history:
+            p.terms = "&terms"
+            p.line(1, "softehl_terms terms = {0, 0, 0, 0};")
+            p.line(1, "(void)terms;")
         self._loads()
         self.stores.start()
         for stage in plan.stages:
@@ -180,8 +193,11 @@ class _Group:
             "#endif",
         ]
 
-    def _load(self, depth: int, letter: str, count: int, width: str, pointer: str) -> None:
-        names = [f"{letter}{k}" for k in range(count)]
+    def _load(
+        self, depth: int, letter: str, count: int, width: str, pointer: str, number: int = 0
+    ) -> None:
+        """Load values of all lanes from a pointer; number: of the first of them."""
+        names = [f"{letter}{k}" for k in range(number, number + count)]
         for name in names:
             self.p.line(depth, f"V {name};")
         for start in range(0, count, 4):
@@ -222,10 +238,9 @@ class _Group:
         p.line(1, "for (ptrdiff_t q = 0; q < points; ++q) {")
         p.line(2, f"const double *restrict w = rule + {d.rule.dimension + 1} * q;")
         p.line(2, "(void)w;")
-        if d.point_data:
-            size = len(d.point_data)
-            p.line(2, f"const double *restrict b = a + {len(d.data)} + {size} * q;")
-            self._load(2, "b", size, self.widths["data"], "b")
+        if d.point_data or d.term_history:
+            p.line(2, f"const double *restrict b = a + {len(d.data)} + {point_expression(d)} * q;")
+            self._point_data()
         if d.interpolated:
             p.line(2, f"const double *restrict B = basis + {d.components} * modes * q;")
             gather(p, 2, "p", "d")
@@ -240,6 +255,24 @@ class _Group:
         elif loop_entries:
             scatter(p, 2, self.task, loop_entries)
         p.line(1, "}")
+
+    def _point_data(self) -> None:
+        """Load the data of the point `q`, and say where its history of terms is."""
+        p, d = self.p, self.p.d
+        size = len(d.point_data)
+        if not d.term_history:
+            self._load(2, "b", size, self.widths["data"], "b")
+            return
+        first = size // 2 if d.point_rates else size
+        self._load(2, "b", first, self.widths["data"], "b")
+        if d.point_rates:
+            p.line(2, f"const double *restrict rates = b + {first} + {terms_expression(d)};")
+            self._load(2, "b", size - first, self.widths["data"], "rates", first)
+            p.line(2, "(void)rates;")
+        p.line(2, f"terms.read = b + {first}, terms.read_step = {self.widths['data']};")
+        if self.task in abi.AT_POINTS:
+            p.line(2, f"terms.write = R + {fields_expression(d)} * q + {len(d.fields)};")
+            p.line(2, f"terms.write_step = {self.widths['values']};")
 
     def _body(self, loop: Loop) -> None:
         """Print the values at a point; each is added to its sum at once, to save storage."""
@@ -268,13 +301,16 @@ class _Group:
     def _fields(self, entries: Sequence[Entry]) -> None:
         """Values at the point `q`: neighbours together."""
         runs: list[list[Entry]] = []
+        width = point_width(self.p.d, self.task)
+        entries = [x for x in entries if x.row.position < width]  # terms are there
         for x in sorted(entries, key=lambda x: x.row.position):
             if runs and runs[-1][-1].row.position + 1 == x.row.position and len(runs[-1]) < 4:
                 runs[-1].append(x)
             else:
                 runs.append([x])
         for run in runs:
-            at = f"R + {point_width(self.p.d, self.task)} * q + {run[0].row.position}"
+            at = f"R + {point_values_expression(self.p.d, self.task)} * q"
+            at += f" + {run[0].row.position}"
             values = ", ".join(self.p.value(x.node) for x in run)
             self.p.line(2, f"softehl_store{len(run)}({at}, {self.widths['values']}, {values});")
 

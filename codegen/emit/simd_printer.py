@@ -11,14 +11,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softehl.codegen import abi
-from softehl.codegen.emit.c_printer import Printer, number
+from softehl.codegen.emit.c_printer import Printer, array_operands, number
 from softehl.codegen.emit.code_motion import If, Same, Statement
 from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, FREE, Input, Node, Op, Routine
+from softehl.codegen.graph.term_reductions import Kind, Reduction
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 
 FUNCTIONS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS}) | ELEMENTARY
-_SAME = ("parameters", "rule", "arrays")
+_SAME = ("parameters", "rule", "arrays", "term history")
 _LETTERS = {
     "coordinates": "X",
     "dofs": "d",
@@ -101,6 +102,10 @@ class LanePrinter(Printer):
             if self.hides(s, right):
                 return
             self.line(depth, f"const V {self.fresh(s)} = {right};")
+            if s.op is Op.ITEM:  # what a routine writes elsewhere has a result that nobody reads
+                routine = s.args[0].payload
+                if isinstance(routine, Reduction) and routine.kind is Kind.EACH:
+                    self.line(depth, f"(void){self.ref(s)};")
 
     def expression(self, n: Node) -> str:
         if not self.is_scalar(n):
@@ -118,7 +123,7 @@ class LanePrinter(Printer):
         name = f"{abi.PREFIX}_{self.d.name}_{routine.name}_lanes"
         mask = self.active or "softehl_mask(1)"
         self.line(depth, f"V {self.fresh(n)}[{routine.outputs}];")
-        arrays = "parameters, " if self.d.arrays else ""
+        arrays = array_operands(self.d, self.terms)
         self.line(
             depth, f"{name}({mask}, {arrays}(const V[]){{{operands}}}, {self.ref(n)}, &failed);"
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from softehl.codegen.emit import array_routines, c_routines, tensor_routines, term_loops
-from softehl.codegen.emit.c_printer import number
+from softehl.codegen.emit.c_printer import array_arguments, array_operands, number
 from softehl.codegen.emit.simd_printer import LanePrinter
 from softehl.codegen.graph.divided_difference import Quotient, SecondQuotient
 from softehl.codegen.graph.graph import Routine
@@ -50,8 +50,7 @@ def _text(d: Definition, r: Routine) -> list[str]:
 
 def _signature(d: Definition, r: Routine) -> str:
     name = f"softehl_{d.name}_{r.name}_lanes"
-    arrays = "const double *restrict parameters, " if d.arrays else ""
-    arguments = f"M active, {arrays}const V *restrict p, V *restrict s, M *lost"
+    arguments = f"M active, {array_arguments(d)}const V *restrict p, V *restrict s, M *lost"
     return f"static void {name}(\n    {arguments})\n"
 
 
@@ -117,10 +116,16 @@ def _inverse(d: Definition, r: Inverse) -> str:
 
 def _one_by_one(d: Definition, r: Routine) -> str:
     """A routine of one element called for each lane that wants it."""
-    arrays = "parameters, " if d.arrays else ""
+    arrays, place = array_operands(d, "&at"), ""
+    if d.term_history:
+        place = """        const softehl_terms at = {
+            terms->read ? terms->read + l * terms->read_step : 0, 0,
+            terms->write ? terms->write + l * terms->write_step : 0, 0};
+        (void)at;
+"""
     return f"""{_signature(d, r)}{{
     for (int l = 0; l < SOFTEHL_LANES; ++l) {{
-        double one[{max(r.inputs, 1)}], out[{r.outputs}];
+{place}        double one[{max(r.inputs, 1)}], out[{r.outputs}];
         for (int k = 0; k < {r.inputs}; ++k) one[k] = softehl_lane(p[k], l);
         for (int k = 0; k < {r.outputs}; ++k) out[k] = NAN;
         if (softehl_lane(active, l) && softehl_{d.name}_{r.name}({arrays}one, out))

@@ -213,6 +213,12 @@ def _side(g: Graph, seed: Node) -> tuple[Node | None, int, Node]:
     return inner.args[0], k, g.neg(value) if seed.op is Op.NEG else value
 
 
+def _along(g: Graph, n: Node, rate: Mapping[Node, Node]) -> Node | None:
+    """Rate of a result of a routine that says it itself."""
+    routine = n.args[0].payload if n.op is Op.ITEM else None
+    return routine.along(g, n, rate) if isinstance(routine, Routine) else None
+
+
 def directional(
     g: Graph,
     roots: Sequence[Node],
@@ -231,6 +237,8 @@ def directional(
             rate[n] = g.sum(rate[n.args[0]])
         elif n.op is Op.BRANCH and square_of(n) is None:
             rate[n] = g.branch(n.args[0], rate[n.args[1]], rate[n.args[2]])
+        elif (moved := _along(g, n, rate)) is not None:
+            rate[n] = moved
         else:
             rate[n] = g.zero
             pairs = (

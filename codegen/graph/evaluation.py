@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -297,7 +297,7 @@ class State:
 
     `rule` holds rows (coordinates..., weight); `basis` [point][mode] = (value, xi-derivative)
     of each field; `point_data` [point][entry]; `arrays` those of any length, `array_rates` how they
-    move along a variation.
+    move along a variation; `term_history` [point][variable][term].
     """
 
     coordinates: Sequence[Number]
@@ -308,6 +308,7 @@ class State:
     basis: Sequence[Sequence[Sequence[Number]]] = ()
     point_data: Sequence[Sequence[Number]] = ()
     arrays: Sequence[Sequence[Number]] = ()
+    term_history: Sequence[Sequence[Sequence[Number]]] = ()
     array_rates: Sequence[Sequence[Number]] = ()
 
 
@@ -328,6 +329,7 @@ class Walk:
             "data": exact(state.data),
             "parameters": exact(state.parameters),
             "arrays": [mpmath.mpf(0)] * len(state.arrays),
+            "term history": [mpmath.mpf(0) for row in state.term_history[:1] for _ in row],
         }
         self.memo: dict[tuple[Node, int], Number] = {}
 
@@ -370,7 +372,7 @@ class Walk:
                 operands = []
                 for a in n.args:
                     operands.append((yield self._at(a, q)))
-                return self._results(n.payload, operands)
+                return self._results(n.payload, operands, q)
             case Op.ITEM:
                 assert isinstance(n.payload, ResultIndex)
                 return (yield self._at(n.args[0], q))[n.payload.index]
@@ -382,25 +384,30 @@ class Walk:
             args.append((yield self._at(a, q)))
         return _UNARY[n.op](*args) if len(args) == 1 else _BINARY[n.op](*args)
 
-    def _results(self, r: Routine, operands: Vector) -> Vector:
+    def _results(self, r: Routine, operands: Vector, q: int) -> Vector:
         if isinstance(r, Reduction):
-            return self._reduced(r, operands)
+            return self._reduced(r, operands, q)
         if isinstance(r, ArrayRoutine) and self.state.arrays:
             rate = exact(self.state.array_rates[r.array]) if self.state.array_rates else ()
             return _of_array(r, exact(self.state.arrays[r.array]), rate, operands)
-        return results(r, operands, self._local)
+        return results(r, operands, partial(self._local, q=q))
 
-    def _reduced(self, r: Reduction, operands: Vector) -> Vector:
-        count = len(r.arrays)
+    def _reduced(self, r: Reduction, operands: Vector, q: int) -> Vector:
         rates = self.state.array_rates or [()] * len(self.state.arrays)
-        arrays = [(exact(self.state.arrays[k]), exact(rates[k])) for k in r.arrays]
-        if not self.state.arrays:  # of any arrays, where none are given
-            arrays = [(exact(TermsLayout().sample(random.Random(k))), []) for k in range(count)]
-        return r.results(r.graph, arrays, operands, self._local)
+        arrays = []
+        for k in r.arrays:
+            if k < 0:
+                arrays.append((exact(self.state.term_history[q][-1 - k]), []))
+            elif self.state.arrays:
+                arrays.append((exact(self.state.arrays[k]), exact(rates[k])))
+            else:  # of any arrays, where none are given
+                arrays.append((exact(TermsLayout().sample(random.Random(k))), []))
+        return r.results(r.graph, arrays, operands, partial(self._local, q=q))
 
-    def _local(self, values: Sequence[Node], local: Vector, external: Vector) -> Vector:
-        """Localised values of a routine."""
-        walk = Walk(self.state, {})
+    def _local(self, values: Sequence[Node], local: Vector, external: Vector, q: int = 0) -> Vector:
+        """Localised values of a routine at a point."""
+        history = self.state.term_history[q : q + 1]
+        walk = Walk(replace(self.state, term_history=history), {})
         walk.arrays = {"local": local, "external": external}
         return [walk.value(n) for n in values]
 

@@ -118,6 +118,10 @@ class Routine:
         """True if adjoints of operands come from those of all results at once (`pullback`)."""
         return False
 
+    def along(self, g: Graph, item: Node, rates: Mapping[Node, Node]) -> Node | None:
+        """Rate of a result from those of the operands; None: the sum of `partials` times these."""
+        return None
+
     def divided(self, between: Any, call: Node) -> list[Node]:
         """Divided differences of all results between two states; see `divided_difference`."""
         raise NotImplementedError

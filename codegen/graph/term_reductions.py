@@ -1,8 +1,9 @@
 """Sums, products, minima and maxima over terms whose number is known at run time only.
 
-A term is an expression of the entries that run-time arrays have for it (`run_time_arrays`), and of
-values from outside that are the same for all terms. A reduction is a routine: one loop over the
-terms. Its derivatives are reductions of derivatives of the term, in the same loop.
+A term is an expression of the entries that run-time arrays have for it (`run_time_arrays`), of its
+history at the point, and of values from outside that are the same for all terms. A reduction is a
+routine: one loop over the terms. Its derivatives are reductions of derivatives of the term, in the
+same loop. A routine of the kind `EACH` reduces nothing: it writes new history, one number a term.
 """
 
 from __future__ import annotations
@@ -33,9 +34,13 @@ class Kind(StrEnum):
     PRODUCT = "product"
     MINIMUM = "minimum"
     MAXIMUM = "maximum"
+    EACH = "each"
 
 
-EMPTY = {Kind.SUM: 0.0, Kind.PRODUCT: 1.0, Kind.MINIMUM: float("inf"), Kind.MAXIMUM: -float("inf")}
+EMPTY = {
+    **{Kind.SUM: 0.0, Kind.PRODUCT: 1.0, Kind.EACH: 0.0},
+    **{Kind.MINIMUM: float("inf"), Kind.MAXIMUM: -float("inf")},
+}
 """Reductions of no terms."""
 
 
@@ -63,8 +68,10 @@ class TermsLayout(ArrayLayout):
 class Reduction(Routine):
     """Reductions of term functions; operands: values from outside, then amounts of the arrays.
 
-    arrays: numbers of the run-time arrays. terms: functions of local inputs, the entries of the
-    arrays and then their rates, and of external ones. entries: what the results are.
+    arrays: numbers of the run-time arrays, -1, -2, ... for the first, second, ... history of terms.
+    terms: functions of local inputs, the entries of the arrays and then their rates, and of
+    external ones. entries: what the results are. targets: of the kind `EACH`, the history that
+    each term function is new for; the results themselves are zero then.
     """
 
     kind: Kind
@@ -72,6 +79,7 @@ class Reduction(Routine):
     terms: tuple[Node, ...]
     entries: tuple[Entry, ...]
     graph: Graph = field(compare=False, repr=False)
+    targets: tuple[int, ...] = ()
     _slopes: dict[Entry, Node] = field(default_factory=dict)
     _family: dict[tuple[Entry, ...], Reduction] = field(default_factory=dict)
 
@@ -79,6 +87,8 @@ class Reduction(Routine):
         """Reductions of the slopes of the terms."""
         call, payload = item.args[0], item.payload
         assert isinstance(payload, ResultIndex)
+        if self.kind is Kind.EACH:
+            raise DifferentiationError(f"{self.name}: new history of terms is no value of the page")
         k, by = self.entries[payload.index]
         pairs = []
         for i, a in enumerate(call.args):
@@ -88,6 +98,30 @@ class Reduction(Routine):
                 derivative = g.node(Op.CALL, call.args, self.with_entries((entry,)))
                 pairs.append((a, g.node(Op.ITEM, (derivative,), ResultIndex(0))))
         return pairs
+
+    def along(self, g: Graph, item: Node, rates: Mapping[Node, Node]) -> Node | None:
+        """Rate of the new history of every term, which is written in its place."""
+        if self.kind is not Kind.EACH:
+            return None
+        call, payload = item.args[0], item.payload
+        assert isinstance(payload, ResultIndex)
+        k, outside = self.entries[payload.index][0], self.inputs - len(self.arrays)
+        moving = [(i, rates[a]) for i, a in enumerate(call.args) if rates[a] is not g.zero]
+        total, more = g.zero, list[Node]()
+        for i, rate in moving:
+            factor = rate if rate.op is Op.CONST else g.input("external", outside + len(more))
+            more += [] if rate.op is Op.CONST else [rate]
+            total = g.add(total, g.mul(self.slope(g, (k, (i,))), factor))
+        routine = reduction(
+            g,
+            f"{self.name}_rate_{k}",
+            Kind.EACH,
+            self.arrays,
+            [total],
+            outside + len(more),
+            targets=(self.targets[k],),
+        )
+        return g.run(routine, [*call.args[:outside], *more, *call.args[outside:]])[0]
 
     def divided(self, between: Any, call: Node) -> list[Node]:
         """Refuse terms that hold single stretches."""
@@ -127,6 +161,7 @@ class Reduction(Routine):
                 self.terms,
                 entries,
                 self.graph,
+                self.targets,
                 self._slopes,
                 self._family,
             )
@@ -147,7 +182,7 @@ class Reduction(Routine):
                 for n in range(len(by) + 1)
                 for part in combinations(by, n)
             )
-        elif self.kind is not Kind.SUM:
+        elif self.kind not in (Kind.SUM, Kind.EACH):
             wanted = dict.fromkeys([*((k, ()) for k, _ in self.entries), *self.entries])
         return sorted(wanted, key=lambda e: (len(e[1]), e))
 
@@ -178,7 +213,7 @@ class Reduction(Routine):
     def _joined(
         self, state: Mapping[Entry, Number], term: Mapping[Entry, Number]
     ) -> dict[Entry, Number]:
-        if self.kind is Kind.SUM:
+        if self.kind in (Kind.SUM, Kind.EACH):
             return {e: state[e] + term[e] for e in state}
         if self.kind is Kind.PRODUCT:
             return {e: sum(state[a] * term[b] for a, b in splits(e)) for e in state}
@@ -201,7 +236,14 @@ def splits(entry: Entry) -> Iterator[tuple[Entry, Entry]]:
 
 
 def reduction(
-    g: Graph, name: str, kind: Kind, arrays: Sequence[int], terms: Sequence[Node], outside: int
+    g: Graph,
+    name: str,
+    kind: Kind,
+    arrays: Sequence[int],
+    terms: Sequence[Node],
+    outside: int,
+    *,
+    targets: tuple[int, ...] = (),
 ) -> Reduction:
     """The routine of reductions of localised terms with so many values from outside."""
     entries: tuple[Entry, ...] = tuple((k, ()) for k in range(len(terms)))
@@ -215,6 +257,7 @@ def reduction(
         tuple(terms),
         entries,
         g,
+        targets,
         _family=family,
     )
     family[entries] = made

@@ -63,6 +63,11 @@ class ElementInterface:
                 f"{d.name} interpolates {d.interpolated} with any number of unknowns: target "
                 f"{host} needs a fixed number, use simd or scalar"
             )
+        if d.term_history:
+            raise TargetError(
+                f"{d.name} has history of each term, {d.term_history[0].name}: target {host} has "
+                "no place for a number of them that is known at run time only"
+            )
         if d.functions:
             raise TargetError(
                 f"{d.name} gets the address of {d.functions[0]} when it is called: target {host} "

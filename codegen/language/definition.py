@@ -10,6 +10,7 @@ from softehl.codegen.external_function import ExternalFunction
 from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.graph.routines import external_functions
 from softehl.codegen.graph.run_time_arrays import RunTimeArray
+from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.sympy_tape import SympyTape
 
 
@@ -19,6 +20,19 @@ class Argument:
 
     name: str
     meaning: str
+
+
+@dataclass(frozen=True)
+class TermHistory:
+    """Data of a point with one number for each term of a run-time array.
+
+    array, terms_of: number and name of this array.
+    """
+
+    name: str
+    meaning: str
+    array: int
+    terms_of: str
 
 
 @dataclass(frozen=True)
@@ -158,6 +172,10 @@ class Definition:
         The model at a point.
     arrays : tuple of RunTimeArray
         Arrays of any length that each call gives: curves, weights of networks.
+    term_history : tuple of TermHistory
+        Point data with one number for each term.
+    term_updates : tuple of Node
+        Their new values.
     term_groups : tuple of tuple of str
         Arrays of terms that have equal lengths.
     record : Record
@@ -214,6 +232,9 @@ class Definition:
     """Arrays of any length, the same for all elements of a call."""
     term_groups: tuple[tuple[str, ...], ...] = ()
     """Arrays of terms that stand in one sum, and so have equal lengths."""
+    term_history: tuple[TermHistory, ...] = ()
+    """Point data with one number for each term; new values are `term_updates`."""
+    term_updates: tuple[Node, ...] = ()
     record: SympyTape = field(default_factory=SympyTape, repr=False, compare=False)
     """The model as written, by which kernels are checked; nothing is derived from it."""
     statements: tuple[Statement, ...] = field(default=(), repr=False, compare=False)
@@ -252,7 +273,7 @@ class Definition:
             point_rates=True,
             product=False,
             pseudo_load=True,
-            fields_rate=bool(self.fields),
+            fields_rate=bool(self.fields or self.term_updates),
             derivatives=(),
             tasks=(),
             point=self.point
@@ -269,6 +290,12 @@ class Definition:
             point data are those of this model, their rates, the adjoints of the history after the
             step, and the rates of these. Elements are compiled as a whole.
         """
+        if self.term_history:
+            name = self.term_history[0].name
+            raise ModelError(
+                f"{self.name} has history of each term, {name}: second derivatives of results know "
+                "none; take differences of result.gradient",
+            )
         prefixes = ("", "rate_", "adjoint_", "rate_adjoint_")
         return replace(
             self,
@@ -294,4 +321,5 @@ class Definition:
 def functions_of_user(d: Definition) -> dict[Node, ExternalFunction]:
     """Calls of C functions of the user in a model."""
     given = [n for pairs in d.prescribed.values() for n in pairs.values()]
+    given += d.term_updates
     return external_functions([d.potential, *(n for _, n in d.fields), *given])

@@ -41,8 +41,8 @@ class Material:
     model : Model
         Model that the law is part of. Its `parameters`, `require`, `point_data`, `history`,
         `fields`, `norm`, `derivative`, `example`, `table`, `network`, `array`, `sum`, `product`,
-        `minimum`, `maximum` and functions of tensors (`log`, `sqrt`, `exp`, `power`, `isotropic`,
-        `eigenvalues`) are methods here as well.
+        `minimum`, `maximum`, `point_array`, `each` and functions of tensors (`log`, `sqrt`, `exp`,
+        `power`, `isotropic`, `eigenvalues`) are methods here as well.
     W : Expr or None
         Energy per reference volume [MPa].
     P : Matrix or None
@@ -68,6 +68,7 @@ class Material:
         self.isotropic, self.eigenvalues = model.isotropic, model.eigenvalues
         self.sum, self.product = model.sum, model.product
         self.minimum, self.maximum = model.minimum, model.maximum
+        self.point_array, self.each = model.point_array, model.each
 
     @property
     def F(self) -> Any:

@@ -59,6 +59,7 @@ class Model(ModelBuilder):
     """
 
     _parent_names = ("xi", "eta", "zeta")
+    _varying_points = True
 
     # declarations -------------------------------------------------------------------------------
 
@@ -277,7 +278,14 @@ class Model(ModelBuilder):
         ModelError
             There is no such point datum.
         """
-        self._outputs.add_history(new, self._arguments.names("point data"))
+        terms = [h.name for h in self._arguments.term_history]
+        renewed = {name: value for name, value in new.items() if name in terms}
+        others = {name: value for name, value in new.items() if name not in terms}
+        declared = [*self._arguments.names("point data"), *terms]
+        self._outputs.add_history(others, declared)
+        history = self._arguments.term_history
+        updates = run_time_terms.updates(self._symbols, history, renewed)
+        self._outputs.add_term_history(updates)
 
     def require(self, *conditions: Any) -> None:
         """Require conditions on parameters and data, such as `mu > 0`; every call checks them.
@@ -577,6 +585,52 @@ class Model(ModelBuilder):
         The kernel has one loop over the terms, whatever their number is.
         """
         return self._reduced(Kind.SUM, arrays_and_function)
+
+    def point_array(self, name: str, terms: TermArray, meaning: str = "") -> TermArray:
+        """Declare history of each term: data of each point with one number for each term.
+
+        Parameters
+        ----------
+        name : str
+            Its name. `Study.add` takes a value at the start for all terms; zero if left out.
+        terms : TermArray
+            Array whose length it has.
+        meaning : str
+            Meaning, with its unit.
+
+        Returns
+        -------
+        TermArray
+            The history, for `sum`, `each` and the like. `history` renews it.
+
+        Raises
+        ------
+        ModelError
+            `terms` is no array, or the name belongs to something else.
+        """
+        declare = partial(self._arguments.point_array, varying=self._varying_points)
+        return run_time_terms.point_array(self._symbols, declare, name, terms, meaning)
+
+    def each(self, *arrays_and_function: Any) -> Any:
+        """Return new history of each term, for `history`.
+
+        Parameters
+        ----------
+        *arrays_and_function : TermArray, then callable
+            Arrays, and a function of one entry of each. It returns a scalar or a list.
+
+        Returns
+        -------
+        NewTerms or list of NewTerms
+            The values, as in m.history(h=m.each(tau, h, lambda tau, h: h * exp(-dt / tau))).
+
+        Raises
+        ------
+        ModelError
+            An argument is no array, or the last one no function.
+        """
+        groups = self._arguments.term_groups
+        return run_time_terms.each(self._symbols, groups, arrays_and_function)
 
     def _reduced(self, kind: Kind, given: Sequence[Any]) -> Any:
         groups = self._arguments.term_groups

@@ -24,7 +24,7 @@ from softehl.codegen.graph.graph import Input, Node, Op
 from softehl.codegen.graph.run_time_arrays import RunTimeArray
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language import local_unknowns
-from softehl.codegen.language.definition import Argument, Condition, Definition
+from softehl.codegen.language.definition import Argument, Condition, Definition, TermHistory
 from softehl.codegen.language.errors import ModelError, NoEquationsError, page_line, warn_page
 from softehl.codegen.language.flatten import CheckedList, Entries, Matrix
 from softehl.codegen.language.sympy_lowering import Symbols
@@ -60,6 +60,7 @@ class Arguments:
         self.conditions: list[Condition] = []
         self.example: dict[str, float] = {}
         self.arrays: list[RunTimeArray] = []
+        self.term_history: list[TermHistory] = []
         self.term_groups: dict[tuple[str, ...], None] = {}
         self._declared: dict[str, tuple[Node, str]] = {}
         self._idle: set[str] = set()
@@ -153,6 +154,16 @@ class Arguments:
             self.arrays.append(record)
         amount = self._input(f"variation of {record.name}", "arrays", number)
         return number, amount
+
+    def point_array(self, record: TermHistory, *, varying: bool) -> tuple[int, sp.Symbol]:
+        """Number of a history with one number for each term, and the amount of its variation."""
+        taken = [a.name for a in (*self.arrays, *self.term_history)]
+        if record.name in taken:
+            raise ModelError(f"the name {record.name} is used twice for arrays: rename one")
+        self.term_history.append(record)
+        number = len(self.term_history) - 1
+        label = f"variation of {record.name}"
+        return number, self._input(label, "term history", number, varying=varying)
 
     def nodal_data(
         self, names: Sequence[str], meaning: str, nodes: int | None
@@ -413,9 +424,15 @@ class Outputs:
         self.fields: list[tuple[str, Node]] = []
         self.history: list[tuple[str, Node]] = []
         self.derivatives: list[tuple[str, Node]] = []
+        self._updates: dict[str, Node] = {}
         self.product = self.pseudo_load = self.fields_rate = False
         self._tasks: tuple[str, ...] | None = None
         self._probes: set[str] = set()
+
+    @property
+    def renewed(self) -> list[Node]:
+        """New values of history of terms."""
+        return list(self._updates.values())
 
     @property
     def tasks(self) -> tuple[str, ...] | None:
@@ -437,6 +454,21 @@ class Outputs:
             self._symbols.record.fields.append((name, value))
             self.fields.append((name, self._symbols.lower(value)))
             self._symbols.state(name, self.fields[-1][1])
+
+    def add_term_history(self, new: Mapping[str, Node]) -> None:
+        """New values of history with one number for each term."""
+        for name in new.keys() & self._updates.keys():
+            raise ModelError(f"history: {name} is given twice in model {self._symbols.model}")
+        self._updates.update(new)
+
+    def term_updates(self, history: Sequence[TermHistory]) -> tuple[Node, ...]:
+        """New values of all history of terms, which must be there."""
+        for h in history:
+            if h.name not in self._updates:
+                raise ModelError(
+                    f"{h.name} is never renewed: m.history({h.name}=m.each(..., lambda ...: new))"
+                )
+        return tuple(self._updates[h.name] for h in history)
 
     def add_history(self, new: Mapping[str, Any], declared: Sequence[str]) -> None:
         """New values of some of the `declared` point data."""
@@ -493,9 +525,9 @@ def check(definition: Definition) -> None:
         raise ModelError(
             f"no pseudo_load or fields_rate for {name}: it gives derivatives of its own"
         )
-    if definition.fields_rate and not definition.fields:
+    if definition.fields_rate and not (definition.fields or definition.term_updates):
         raise ModelError(f"no fields_rate for {name}: it declares no fields")
-    if Task.FIELDS in tasks and not definition.fields:
+    if Task.FIELDS in tasks and not (definition.fields or definition.term_updates):
         raise ModelError(f"no task fields for {name}: it declares none")
 
 
@@ -599,6 +631,8 @@ class ModelBuilder:
             internal=tuple(a.internal),
             arrays=tuple(a.arrays),
             term_groups=tuple(a.term_groups),
+            term_history=tuple(a.term_history),
+            term_updates=self._outputs.term_updates(a.term_history),
             functions=tuple(self._functions),
             record=self._symbols.record,
             statements=tuple(self._symbols.statements),
@@ -614,7 +648,8 @@ class ModelBuilder:
             for n in (*pairs, *pairs.values())
         ]
         equations = set(reachable([potential, *prescribed]))
-        used = equations | set(reachable([n for _, n in self._outputs.evaluated]))
+        renewed = self._outputs.renewed
+        used = equations | set(reachable([*(n for _, n in self._outputs.evaluated), *renewed]))
         self._arguments.check_use(equations, used, self._unused)
 
     def _address(self, function: str) -> Node:

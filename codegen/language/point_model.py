@@ -25,6 +25,8 @@ from softehl.codegen.language.flatten import Entries
 class PointModel(Fields):
     """Model of a point: values and gradients are unknowns, densities are per volume."""
 
+    _varying_points = False
+
     def __init__(self, name: str, cell: Element, geometry: str, doc: str) -> None:
         super().__init__(name, cell, geometry, 1, point_rule(), doc)
         self._X = [x[0] for x in self.coordinates(*"XYZ"[: cell.dimension])]

@@ -116,6 +116,8 @@ class SympyTape:
     potentials: list[tuple[Any, tuple[Any, ...]]] = field(default_factory=list)
     fields: list[tuple[str, Any]] = field(default_factory=list)
     history: list[tuple[str, Any]] = field(default_factory=list)
+    updates: list[tuple[int, Any]] = field(default_factory=list)
+    """Numbers of history of terms, and symbols of their new values."""
 
     def define(self, symbol: Any, meaning: Any) -> Any:
         """Note what a symbol means (the first time counts); returns the symbol."""

@@ -11,6 +11,7 @@ from softehl.codegen import abi
 from softehl.codegen.emit import c_source
 from softehl.codegen.emit.liveness import peak_live
 from softehl.codegen.graph.run_time_arrays import RunTimeArray
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.pipeline import Function, KernelSource
 
 
@@ -72,6 +73,8 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "places": [list(dof) for dof in d.dof_nodes],
         "history": list(d.history),
         **({"internal": list(d.internal)} if d.internal else {}),
+        **({"term_history": _term_history(d)} if d.term_history else {}),
+        **({"point_rates": True} if d.term_history and d.point_rates else {}),
         **({"term_groups": [list(g) for g in d.term_groups]} if d.term_groups else {}),
         **({"functions": list(d.functions)} if d.functions else {}),
         **({"cell": d.cell} if d.cell else {}),
@@ -86,6 +89,11 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "design_bytes": len(kernel.design.encode()),
         "signature": hashlib.sha256((kernel.text + kernel.design).encode()).hexdigest()[:16],
     }
+
+
+def _term_history(d: Definition) -> dict[str, str]:
+    """Names of history of terms, and of the arrays that say how many terms there are."""
+    return {h.name: h.terms_of for h in d.term_history}
 
 
 def _array(a: RunTimeArray) -> dict[str, Any]:

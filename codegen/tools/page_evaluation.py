@@ -36,6 +36,7 @@ def evaluate(
             basis=state.basis.tolist(),
             point_data=state.point_data.tolist(),
             arrays=[a.tolist() for a in state.arrays],
+            term_history=[[a.tolist() for a in row] for row in state.term_history],
         ),
     )
     return [(v.name, v.values, v.where) for v in explained.values], explained.fault

@@ -203,7 +203,7 @@ def _derivatives(d: Definition) -> tuple[list[Node], list[Node]]:
 
 
 _ARRAYS = {"coordinates", "dofs", "data", "parameters", "rule", "point data", "interpolated"} | {
-    "arrays"
+    *("arrays", "term history")
 }
 
 

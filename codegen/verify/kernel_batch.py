@@ -31,7 +31,7 @@ class Batch:
         self.arrays = [
             _doubles(v for s in states for v in s.coordinates),
             _doubles(v for s in states for v in s.dofs),
-            _doubles(v for s in states for row in (s.data, *s.point_data) for v in row),
+            _doubles(v for s in states for v in data_of_element(d, s)),
             _doubles(()),
             _doubles(()),
             _doubles(v for row in first.rule for v in row),
@@ -49,8 +49,10 @@ class Batch:
 
     def prepared(self, task: str) -> tuple[Any, Any, Callable[[], None]]:
         """Width and array of values and of tangents, and the call that fills them."""
+        terms = self.states[0].term_history[:1]
+        count = sum(len(h) for row in terms for h in row[: len(self.d.term_history)])
         width = {abi.Task.ENERGY: 1}
-        width |= {t: self.points * point_width(self.d, t) for t in abi.AT_POINTS}
+        width |= {t: self.points * (point_width(self.d, t) + count) for t in abi.AT_POINTS}
         width[abi.Task.ADJOINT_RATE] = design_width(self.d) + self.ndof
         wide = width.get(abi.Task(task), self.ndof) if task in set(abi.Task) else self.ndof
         square = self.ndof**2 if task == abi.Task.TANGENT else 0
@@ -85,6 +87,21 @@ class Batch:
             return False
         values = self.call(task)[0]
         return any(all(map(math.isnan, v)) for v in (values[:1] if first else values))
+
+
+def data_of_element(d: Definition, s: State) -> list[float]:
+    """Data of an element, then those of each point: its own, history of terms, then their rates."""
+    half = len(d.point_data) // 2 if d.point_rates else len(d.point_data)
+    values = [float(v) for v in s.data]
+    for q in range(len(s.rule)):
+        own = list(s.point_data[q]) if s.point_data else []
+        terms = list(s.term_history[q]) if s.term_history else []
+        for some, rows in (
+            (own[:half], terms[: len(d.term_history)]),
+            (own[half:], terms[len(d.term_history) :]),
+        ):
+            values += [float(v) for v in some] + [float(v) for row in rows for v in row]
+    return values
 
 
 def parameters_of(state: State, *, rates: bool = False) -> list[float]:

@@ -126,8 +126,19 @@ def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
         basis=[_linear(float(p[0]), len(_fields(d))) for p in rule] if d.interpolated else (),
         point_data=[[about_one(a.name) for a in d.point_data] for _ in rule],
         arrays=arrays,
+        term_history=_term_history(d, rng, arrays),
         array_rates=[a.layout.rate(rng, v) for a, v in zip(d.arrays, arrays, strict=True)],
     )
+
+
+def _term_history(
+    d: Definition, rng: random.Random, arrays: Sequence[Sequence[float]]
+) -> list[list[list[float]]]:
+    """History of each term, and its rates where the model has some: numbers about 1."""
+    if not d.term_history:
+        return []
+    lengths = [len(arrays[h.array]) for h in d.term_history] * (2 if d.point_rates else 1)
+    return [[[rng.uniform(0.5, 1.5) for _ in range(n)] for n in lengths] for _ in d.rule.points]
 
 
 def _coordinates(d: Definition, rng: random.Random, deviation: float) -> list[float]:

@@ -60,7 +60,8 @@ class Evaluator:
         self._inner: dict[int, list[Operation]] = {}
         self._selected: dict[Any, list[Operation]] = {}
         slots = [slot for slot, _ in program.potentials]
-        self.order = self.operations(program.above([*slots, *program.fields]))
+        at_points = [*program.fields, *program.updates]
+        self.order = self.operations(program.above([*slots, *at_points]))
 
     def operations(self, steps: Sequence[Step]) -> list[Operation]:
         """The steps with their functions."""
@@ -177,6 +178,7 @@ class Evaluation:
             "data": [n.number(v) for v in state.data],
             "parameters": [n.number(v) for v in state.parameters],
             "arrays": [n.number(0)] * len(state.arrays),
+            "term history": [n.number(0) for row in state.term_history[:1] for _ in row],
         }
         self.moving = [
             [(n.number(v), n.number(w)) for v, w in zip(a, b, strict=True)]
@@ -274,13 +276,18 @@ class Evaluation:
     def _terms(self, s: Step, row: Row, q: int) -> Number:
         """Reduction over the terms of run-time arrays."""
         entries, value, kind, numbers = s.content
+        number = self.evaluator.arithmetic.number
         columns = [
-            [v + row[a] * w if row[a] else v for v, w in self.moving[k]]
-            for k, a in zip(numbers, s.args, strict=True)
+            [number(v) for v in self.state.term_history[q][k]]
+            if array == "term history"
+            else [v + row[a] * w if row[a] else v for v, w in self.moving[k]]
+            for (array, k), a in zip(numbers, s.args, strict=True)
         ]
         terms = [self._with(s, q, entries, list(t), value)[0] for t in zip(*columns, strict=True)]
         if None in terms:
             raise NotRealError
+        if kind == "each":
+            return terms
         n = self.evaluator.arithmetic
         if kind == "sum":
             return n.sum(s.slot, len(terms))(*terms)
@@ -344,7 +351,7 @@ class Evaluation:
             for slot, _ in page.potentials:
                 self.value(slot)
             for q in range(len(self.rows)):
-                for slot in page.fields:
+                for slot in (*page.fields, *page.updates):
                     self.value(slot, q)
         except NotRealError:
             return False
@@ -485,7 +492,7 @@ class ReferenceTasks:
     def fields_rate(self, direction: Sequence[float]) -> list[Vector]:
         """Derivative of the fields, [point][field], along a variation that ends with the dofs."""
         moves, h = self._split(direction), self.evaluator.arithmetic.step
-        roots = tuple(self.program.fields)
+        roots = (*self.program.fields, *self.program.updates)
         plus, minus = (self._fields(self.base.moved(_times(moves, t * h), roots)) for t in (1, -1))
         return [
             [(a - b) / (2 * h) for a, b in zip(*rows, strict=True)]
@@ -523,7 +530,11 @@ class ReferenceTasks:
 
     def _fields(self, at: Evaluation) -> list[Vector]:
         points = range(len(self.state.rule))
-        return [[at.value(slot, q) for slot in self.program.fields] for q in points]
+        fields, updates = self.program.fields, self.program.updates
+        return [
+            [*(at.value(k, q) for k in fields), *(v for k in updates for v in at.value(k, q))]
+            for q in points
+        ]
 
     def _residual(self, at: Evaluation, along: Along) -> Vector:
         h = self.evaluator.arithmetic.step

@@ -69,7 +69,8 @@ class Switch:
 class Program:
     """All operations of a model; `main` are those without local unknowns.
 
-    potentials: slot and frozen slots of each; fields: slot of each.
+    potentials: slot and frozen slots of each; fields: slot of each; updates: of new history of
+    terms, a list of numbers each.
     """
 
     definition: Definition
@@ -77,6 +78,7 @@ class Program:
     main: list[Step] = field(default_factory=list)
     potentials: list[tuple[int, tuple[int, ...]]] = field(default_factory=list)
     fields: list[int] = field(default_factory=list)
+    updates: list[int] = field(default_factory=list)
     switches: list[Switch] = field(default_factory=list)
 
     def moved(self) -> set[int]:
@@ -102,6 +104,7 @@ def program(d: Definition) -> Program:
     for expression, frozen in d.record.potentials:
         out.potentials.append((made(expression), tuple(made(s) for s in frozen)))
     out.fields = [made(value) for _, value in (*d.record.fields, *d.record.history)]
+    out.updates = [made(symbol) for _, symbol in sorted(d.record.updates, key=lambda u: u[0])]
     out.steps = made.steps
     out.main = [s for s in made.steps if not s.locals]
     out.switches = [s for s in made.switches if _changes(out, s)]
@@ -221,7 +224,7 @@ class _Builder:
                 )
             case Terms():
                 entries, (value,) = self._at(*m.entries), self._at(m.value)
-                numbers = tuple(self.record.inputs[a][1] for a in m.amounts)
+                numbers = tuple(self.record.inputs[a] for a in m.amounts)
                 inner = self._between(entries, (value,))
                 content = (entries, (value,), m.kind, numbers)
                 return self._add("terms", self._at(*m.amounts), content, inner=inner)

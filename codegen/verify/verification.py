@@ -298,7 +298,7 @@ class _View:
             size = max(abs(exact[0]), work * max(abs(float(u)) for u in self.page.state.dofs))
             return [size or 1.0]
         if task in abi.AT_POINTS:
-            count = len(self.d.fields)
+            count = len(exact) // self.called.points
             columns = [exact[k::count] for k in range(count)]
             return [max(FLOOR, *map(abs, c)) for c in columns] * (len(exact) // count)
         if task in (abi.Task.RESIDUAL, abi.Task.PRODUCT):

@@ -172,6 +172,8 @@ def page_on(
     around = nodes if facet is None else nodes[:, facet]
     centres = mesh.points[around].mean(axis=1) if around.size else nowhere
     data = {d: datum(name, d, arguments[d], centres) for d in kernel.data if d in arguments}
+    arrays = _arrays(name, kernel, arguments)
+    kernel = kernel.with_lengths([len(a.numbers) for a in arrays.values()])
     return Block(
         name=name,
         kernel=kernel,
@@ -189,7 +191,7 @@ def page_on(
             for p in kernel.parameters
             if p in arguments
         },
-        arrays=_arrays(name, kernel, arguments),
+        arrays=arrays,
     )
 
 
@@ -237,7 +239,8 @@ def _require_fit(mesh: Mesh, kernel: Kernel) -> None:
 
 def _arguments(kernel: Kernel) -> list[str]:
     arrays = [a.name for a in kernel.arrays]
-    return [*kernel.parameters, *kernel.data, *kernel.point_data, *arrays]
+    terms = [name for name, _ in kernel.term_history]
+    return [*kernel.parameters, *kernel.data, *kernel.point_data, *arrays, *terms]
 
 
 def _nodal_data(kernel: Kernel) -> dict[str, list[str]]:
@@ -293,7 +296,10 @@ def _initial(
     """Point data at the start, (n, points, k): numbers or functions of the centres, else zero."""
     if not kernel.point_data:
         return None
-    columns = [datum(block, name, arguments.get(name, 0.0), centres) for name in kernel.point_data]
+    columns = [
+        datum(block, name, arguments.get(name.partition("[")[0], 0.0), centres)
+        for name in kernel.point_data
+    ]
     points = len((rule or kernel.default_rule).weights)
     return np.repeat(np.stack(columns, axis=1)[:, None, :], points, axis=1)
 

@@ -65,7 +65,11 @@ class KernelOrigin:
         """
         if isinstance(self.source, Kernel) or is_folder(self.source):
             return None
-        if order == 1 and "pseudo_load" in kernel.tasks and not kernel.point_data:
+        if (
+            order == 1
+            and "pseudo_load" in kernel.tasks
+            and not (kernel.point_data or kernel.term_history)
+        ):
             return None  # it comes with what is needed
         return DerivativeKernel(self, kernel, order)
 

@@ -69,7 +69,7 @@ def _numbers(values: Array) -> str:
 class ElementState:
     """Arguments of one element: arrays in the kernel's order, points with their weights.
 
-    arrays: of any length, such as curves.
+    arrays: of any length, such as curves. term_history: of each point the numbers of each term.
     """
 
     coordinates: Array
@@ -80,6 +80,7 @@ class ElementState:
     rule: Array
     basis: Array
     arrays: tuple[Array, ...] = ()
+    term_history: tuple[tuple[Array, ...], ...] = ()
 
 
 def explanation(folder: Path, kernel: str, state: ElementState) -> Explanation:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +61,8 @@ class Kernel(Family):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For `copy` and `pickle`."""
-        return _reloaded, (self.name, _library_folder(self.library), self.signature)
+        folder = _library_folder(self.library)
+        return _reloaded, (self.name, folder, self.signature, self.lengths)
 
     def call(self, task: str, coordinates: Array, dofs: Array, **kwargs: Any) -> Call:
         """Return a checked call of a task, which can be repeated with other unknowns.
@@ -282,7 +284,7 @@ class Kernel(Family):
         call = Call(
             self, "fields_rate", coordinates, dofs, CallArguments(direction=direction, **kwargs)
         )
-        return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
+        return call.run(np.empty((call.n, len(call.rule.weights), len(call.kernel.fields))))
 
     def adjoint_rate(
         self, coordinates: Array, dofs: Array, direction: Array, **kwargs: Any
@@ -372,7 +374,7 @@ class Kernel(Family):
             An array has a wrong shape, or the kernel has no such task.
         """
         call = Call(self, "fields", coordinates, dofs, CallArguments(**kwargs))
-        return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
+        return call.run(np.empty((call.n, len(call.rule.weights), len(call.kernel.fields))))
 
     def explain(
         self, coordinates: Array, dofs: Array, *, element: int = 0, **kwargs: Any
@@ -420,17 +422,31 @@ class Kernel(Family):
         call = Call(self, task, coordinates[one], dofs[one], CallArguments(**given))
         points, columns = len(call.rule.weights), len(self.data)
         data = call.read[2].ravel()
+        at_points, terms = _split_terms(call.kernel, data[columns:].reshape(points, -1))
         state = ElementState(
             coordinates=call.read[0].ravel(),
             dofs=call.read[1].ravel(),
             data=data[:columns],
             parameters=call.read[3][: len(self.parameters)],
-            point_data=data[columns:].reshape(points, -1),
+            point_data=at_points,
             rule=call.rule.table,
             basis=call.rule.shape_functions,
             arrays=tuple(unpacked(call.read[3], len(self.parameters), len(self.arrays))),
+            term_history=terms,
         )
         return explanation(self.library.directory, self.name, state)
+
+
+def _split_terms(kernel: Family, rows: Array) -> tuple[Array, tuple[tuple[Array, ...], ...]]:
+    """Data of each point without history of terms, and this history."""
+    if kernel.lengths is None:
+        return rows, ()
+    of = {a.name: n for a, n in zip(kernel.arrays, kernel.lengths, strict=True)}
+    counts = [of[array] for _, array in kernel.term_history]
+    first = rows.shape[1] - sum(counts)
+    ends = np.cumsum([first, *counts])
+    pairs = list(pairwise(ends))
+    return rows[:, :first], tuple(tuple(row[a:b] for a, b in pairs) for row in rows)
 
 
 _OF_ELEMENTS = ("data", "point_data")
@@ -458,7 +474,9 @@ def _library_folder(library: Library) -> Path | None:
     return None if library.directory == GENERATED else library.directory
 
 
-def _reloaded(name: str, directory: Path | None, signature: str) -> Kernel:
+def _reloaded(
+    name: str, directory: Path | None, signature: str, lengths: tuple[int, ...] | None = None
+) -> Kernel:
     """The kernel of that name and signature.  Raises `KernelError` where it is not there."""
     folder = GENERATED if directory is None else directory
     remedy = "run the script that made it again on this machine"
@@ -467,7 +485,7 @@ def _reloaded(name: str, directory: Path | None, signature: str) -> Kernel:
     kernel = load_kernel(name, folder)
     if kernel.signature != signature:
         raise StaleKernelsError(f"the kernel {name} in {folder} is another one now: {remedy}")
-    return kernel
+    return kernel.with_lengths(lengths)
 
 
 def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
@@ -495,6 +513,8 @@ def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
         internal=tuple(entry.get("internal", ())),
         functions=tuple(entry.get("functions", ())),
         term_groups=tuple(map(tuple, entry.get("term_groups", ()))),
+        term_history=tuple(entry.get("term_history", {}).items()),
+        point_rates=entry.get("point_rates", False),
         cell=entry.get("cell", ""),
         kept=entry.get("kept", 0),
         arrays=tuple(_array(n, a) for n, a in entry.get("arrays", {}).items()),

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import cffi
 import numpy as np
@@ -22,6 +22,7 @@ from softehl.runtime.kernels.run_time_arrays import (
     is_packed,
     packed,
     require_equal_lengths,
+    unpacked,
 )
 from softehl.runtime.kernels.shared_library import KernelError, Library
 
@@ -142,11 +143,34 @@ class Family:
     places: tuple[tuple[str, int | None], ...] = ()
     history: tuple[str, ...] = ()
     internal: tuple[str, ...] = ()
+    point_rates: bool = False
     functions: tuple[str, ...] = ()
     cell: str = ""
     kept: int = 0
     arrays: tuple[RunTimeArray, ...] = ()
     term_groups: tuple[tuple[str, ...], ...] = ()
+    term_history: tuple[tuple[str, str], ...] = ()
+    lengths: tuple[int, ...] | None = None
+
+    def with_lengths(self, lengths: Sequence[int] | None) -> Self:
+        """Return the family with a name for each number of history of terms: h[0], h[1], ...
+
+        lengths: of all run-time arrays.
+        """
+        if not self.term_history or self.lengths is not None or lengths is None:
+            return self
+        of = {a.name: n for a, n in zip(self.arrays, lengths, strict=True)}
+        names = tuple(f"{h}[{k}]" for h, array in self.term_history for k in range(of[array]))
+        new = tuple(f"new_{n}" for n in names)
+        half = len(self.point_data) // 2 if self.point_rates else len(self.point_data)
+        rates = tuple(f"rate_{n}" for n in names) if self.point_rates else ()
+        return replace(
+            self,
+            point_data=(*self.point_data[:half], *names, *self.point_data[half:], *rates),
+            fields=(*self.fields, *new),
+            history=(*self.history, *names),
+            lengths=tuple(lengths),
+        )
 
     def with_arrays(self, parameters: Sequence[float] | Array, given: Mapping[str, Any]) -> Array:
         """Parameters as C reads them: numbers, then the arrays that `given` has by name.
@@ -177,6 +201,17 @@ class CallArguments:
     rule: Rule | None = None
 
 
+def _lengths(kernel: Family, parameters: Any) -> list[int]:
+    """Lengths of the run-time arrays of a call.  Raises ArgumentError."""
+    if not isinstance(parameters, Mapping):
+        count = len(kernel.parameters)
+        return [len(a) for a in unpacked(np.asarray(parameters), count, len(kernel.arrays))]
+    missing = [a.name for a in kernel.arrays if a.name not in parameters]
+    if missing:
+        raise ArgumentError(f"{kernel.name} needs {', '.join(missing)}")
+    return [np.size(parameters[a.name]) for a in kernel.arrays]
+
+
 class Call:
     """Checked arguments of one call.
 
@@ -190,6 +225,8 @@ class Call:
         """Raises ArgumentError for a task, shape, kind or value that does not fit."""
         if task not in kernel.tasks:
             raise ArgumentError(f"{kernel.name} offers {', '.join(kernel.tasks)}, not {task}")
+        if kernel.term_history and kernel.lengths is None:
+            kernel = kernel.with_lengths(_lengths(kernel, arguments.parameters))
         self.kernel, self.task = kernel, task
         self.function = kernel.library.function(kernel.name, task)
         self.rule = self._rule(arguments.rule)

@@ -110,7 +110,7 @@ class ElementDerivatives:
         page = self.page
         assert page is not None
         if page.differentiated is not None:
-            return page.differentiated()
+            return page.differentiated().with_lengths(page.kernel.lengths)
         if task not in page.kernel.tasks or page.kernel.point_data:
             raise StudyError(
                 f"{page.name!r}: {page.kernel.name} comes as C without derivatives: give its page "

@@ -31,6 +31,15 @@ CALLS: dict[str, tuple[list[float], list[float], dict[str, Any]]] = {
     "condensed": ([0.0, 2.0], [0.0, 0.3], {"parameters": [2.0]}),
     "spring_of_data": ([], [1.3], {"parameters": {"energy": ([0, 1, 2, 3], [0, 1, 5, 9])}}),
     "learned_spring": ([], [0.3], {"parameters": {"W": initial_weights(2, (4, 3), seed=1)}}),
+    "prony_bar": (
+        [0.0, 2.0],
+        [0.0, 0.3],
+        {
+            "parameters": {"E": 2.0, "dt": 0.1, "g": [0.4, 0.3], "tau": [0.2, 1.0]},
+            "data": [0.0, 0.1],
+            "point_data": np.array([[0.02, -0.01]]),
+        },
+    ),
     "fibres": ([], [0.3], {"parameters": {"k": [3.0, 1.0, 2.0], "crimp": [0.0, 0.1, 0.4]}}),
     "damaged_spring": ([], [0.7], {"parameters": [1.3]}),
     "ogden": (SQUARE, MOVED, {"parameters": [1.0, 1.7]}),

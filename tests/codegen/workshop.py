@@ -133,6 +133,12 @@ def element_state(kernel: Kernel, coordinates: Any, dofs: Any, **given: Any) -> 
     if isinstance(parameters, Mapping):
         arrays = [data_of(a, parameters[a.name]).numbers.tolist() for a in kernel.arrays]
         parameters = [parameters[p] for p in kernel.parameters]
+    rows, terms = np.asarray(given.get("point_data", ())), list[Any]()
+    if kernel.term_history:
+        of = {a.name: len(v) for a, v in zip(kernel.arrays, arrays, strict=True)}
+        rows, history = rows[:, : len(kernel.point_data)], rows[:, len(kernel.point_data) :]
+        ends = np.cumsum([of[array] for _, array in kernel.term_history])[:-1]
+        terms = [[part.tolist() for part in np.split(row, ends)] for row in history]
     return State(
         np.ravel(coordinates).tolist(),
         np.ravel(dofs).tolist(),
@@ -140,8 +146,9 @@ def element_state(kernel: Kernel, coordinates: Any, dofs: Any, **given: Any) -> 
         list(parameters),
         table.tolist(),
         () if rule.basis is None else rule.basis.tolist(),
-        np.asarray(given.get("point_data", ())).tolist(),
+        rows.tolist(),
         arrays,
+        term_history=terms,
     )
 
 

@@ -85,6 +85,8 @@ def text(layout: Layout, task: str, outputs: PointOutputs, plan: Schedule) -> tu
     p = LanePrinter(layout.site)
     needs = Needs.of(outputs.entries)
     p.line(1, f"{' '.join(f'(void){n};' for n in ('parameters', *ARRAYS.values(), 'P', 'A'))}")
+    if layout.site.term_history:
+        p.line(1, "(void)terms;")
     p.line(1, "M failed = softehl_mask(0);")
     for array, argument in ARRAYS.items():
         for k in needs[array]:
@@ -94,8 +96,10 @@ def text(layout: Layout, task: str, outputs: PointOutputs, plan: Schedule) -> tu
     _statements(p, outputs.targets(), [s for stage in plan.stages for s in stage.preamble])
     p.line(1, "return failed;")
     arguments = ", ".join(f"const V *restrict {a}" for a in ARRAYS.values())
+    terms = "const softehl_terms *terms, " if layout.site.term_history else ""
     head = (
-        f"static M {name(layout, task)}(\n    const double *restrict parameters, {arguments},\n"
+        f"static M {name(layout, task)}(\n    const double *restrict parameters, {terms}"
+        f"{arguments},\n"
         "    V *restrict P, V *restrict A)"
     )
     return "\n".join([head, "{", p.text(), "}", ""]), p.temporaries

@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from softehl.codegen.abi import Task
+from softehl.codegen.abi import AT_POINTS, Task
+from softehl.codegen.emit.c_printer import (
+    fields_expression,
+    point_expression,
+    terms_expression,
+)
 from softehl.codegen.emit.points.c_lines import load
 from softehl.codegen.emit.points.loop_nest import Frame, components
 from softehl.codegen.emit.points.point_layout import orders
@@ -129,7 +134,9 @@ class PointInputs:
         d = self.f.layout.d
         count = len(d.point_data)
         self.f.out.add(f"V b[{max(count, 1)}];")
-        if count and self.f.needs["point data"]:
+        if d.term_history:
+            self._term_history(count)
+        elif count and self.f.needs["point data"]:
             load(
                 self.f.out,
                 "b",
@@ -137,6 +144,24 @@ class PointInputs:
                 count,
                 f"({len(d.data)} + {count * self.f.layout.points})",
             )
+
+    def _term_history(self, count: int) -> None:
+        """Data of the point where each term has history, and where this is."""
+        f, d = self.f, self.f.layout.d
+        width = f"({len(d.data)} + {point_expression(d)} * {f.layout.points})"
+        first = count // 2 if d.point_rates else count
+        f.out.add(f"const double *const at = a + {len(d.data)} + {point_expression(d)} * q;")
+        for start, amount, place in (
+            (0, first, "at"),
+            (first, count - first, f"at + {first} + {terms_expression(d)}"),
+        ):
+            if amount:
+                load(f.out, f"(b + {start})", place, amount, width)
+        write, step = "0", "0"
+        if f.task in AT_POINTS:
+            step = f"({fields_expression(d)} * {f.layout.points})"
+            write = f"R + {fields_expression(d)} * q + {len(d.fields)}"
+        f.out.add(f"const softehl_terms terms = {{at + {first}, {width}, {write}, {step}}};")
 
     def _direction(self, values: dict[str, str]) -> dict[str, str]:
         """The argument t: how what the function reads moves."""

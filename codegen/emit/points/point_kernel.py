@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from softehl.codegen import abi
 from softehl.codegen.abi import PREFIX, Task
 from softehl.codegen.emit.batch_functions import functions
+from softehl.codegen.emit.c_printer import fields_expression
 from softehl.codegen.emit.c_source import HEADER
 from softehl.codegen.emit.code_motion import Schedule
 from softehl.codegen.emit.points import (
@@ -61,7 +62,8 @@ class Centroid(Frame):
         PointInputs(self).write()
         out.add(f"V A[{max(len(outputs.moduli), rates, 1)}];")
         call = point_function.name(layout, self.task)
-        out.add(f"failed |= {call}(parameters, x, g, e, b, t, c, A);")
+        terms = "&terms, " if layout.d.term_history else ""
+        out.add(f"failed |= {call}(parameters, {terms}x, g, e, b, t, c, A);")
         if rates:
             out.add(f"for (int k = 0; k < {rates}; ++k) dc[k] = A[k];")
         for k in range(count if self.task == Task.TANGENT else 0):
@@ -149,12 +151,13 @@ class Group(Frame):
         out.add(f"V P[{max(len(outputs.rows), 1)}];")
         out.add(f"V A[{max(len(outputs.moduli), len(outputs.rates), 1)}];")
         call = point_function.name(self.layout, self.task)
-        out.add(f"failed |= {call}(parameters, x, g, e, b, t, P, A);")
+        terms = "&terms, " if d.term_history else ""
+        out.add(f"failed |= {call}(parameters, {terms}x, g, e, b, t, P, A);")
         if self.task == Task.ENERGY:
             out.add("r[0] += w * P[0];")
         elif self.task in abi.AT_POINTS:
-            width = f"({len(d.fields)} * {self.layout.points})"
-            store(out, f"R + {len(d.fields)} * q", "P", len(d.fields), width)
+            width = f"({fields_expression(d)} * {self.layout.points})"
+            store(out, f"R + {fields_expression(d)} * q", "P", len(d.fields), width)
         else:
             moved = self.task == Task.PSEUDO_LOAD
             to_nodes(self, self._moved_fluxes() if moved else self._plain_fluxes(), "r", "w * ")

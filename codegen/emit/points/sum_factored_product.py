@@ -202,7 +202,7 @@ def scatter(components: int, nodes: int) -> list[str]:
 def fits(layout: Layout) -> bool:
     """True if a model has a product by sum factorisation on its cell."""
     shape, cell = layout.geometry, layout.d.cell
-    if layout.form.centroid:
+    if layout.form.centroid or layout.d.term_history:
         return False
     if shape.line is None or not cell.startswith(("quad", "hex")) or layout.dimension < 2:
         return False
