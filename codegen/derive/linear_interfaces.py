@@ -116,7 +116,7 @@ class _Expansion:
             return {(n.id,): Fraction(1)}
         args = [self.memo[a] for a in n.args]
         if n.op is Op.MUL:
-            out = product(*args)
+            out = product(args[0], args[1])
         else:
             sign = -1 if n.op in (Op.SUB, Op.NEG) else 1
             first, second = (args[0], args[1]) if len(args) == 2 else ({}, args[0])

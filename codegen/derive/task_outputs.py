@@ -188,7 +188,7 @@ def argument_seeds(d: Definition) -> dict[Node, Node]:
     }
     inputs = ((array, k) for array, width in widths.items() for k in range(width))
     g = d.graph
-    seeds = {g.input(*source): g.input("direction", n) for n, source in enumerate(inputs)}
+    seeds = {g.input(array, k): g.input("direction", n) for n, (array, k) in enumerate(inputs)}
     count = d.page_point_data if d.point_rates else 0
     for k, varying in product(range(count), (False, True)):
         value = g.input("point data", k, varying=varying)

@@ -217,7 +217,7 @@ class _Scheduler:
             n = self.new[p.node] = g.rebuild(p.node.op, operands, p.node.payload)
             self._print(n)
             return p.node, p.node
-        term = g.mul(*operands) if len(operands) == 2 else operands[0]
+        term = g.mul(operands[0], operands[1]) if len(operands) == 2 else operands[0]
         self._print(term)
         total = p.total
         if total.partial is None:
@@ -286,8 +286,8 @@ def _used(block: Sequence[Statement], live: set[Node]) -> list[Statement]:
     for s in reversed(block):
         if isinstance(s, If):
             live.update(a for n in s.merged for a in n.args)
-            sides = [_used(side, live) for side in (s.then, s.otherwise)]
-            out.append(If(s.condition, s.merged, *sides))
+            then, otherwise = (_used(side, live) for side in (s.then, s.otherwise))
+            out.append(If(s.condition, s.merged, then, otherwise))
         elif isinstance(s, Same):
             if s.old in live or s.new in live:
                 live.add(s.new)
@@ -397,8 +397,8 @@ class _Runs:
         return parts
 
     def _branch(self, s: If, computed: set[Node]) -> If:
-        sides = [self.block(side, set(computed)) for side in (s.then, s.otherwise)]
-        return If(s.condition, s.merged, *sides)
+        then, otherwise = (self.block(side, set(computed)) for side in (s.then, s.otherwise))
+        return If(s.condition, s.merged, then, otherwise)
 
     def _arranged(self, nodes: Sequence[Node], computed: set[Node]) -> Iterator[Statement]:
         outputs = [n for n in nodes if n in self.outputs]

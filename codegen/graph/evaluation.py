@@ -143,8 +143,8 @@ def _tensor(r: TensorRoutine, args: Vector, evaluate: Evaluate) -> Vector:
         return _tensor_value(f, x, external, evaluate)
 
     def rate(x: Vector, j: int, of: Callable[[Vector], Vector]) -> Vector:
-        ends = [of([v + t * h * (k == j) for k, v in enumerate(x)]) for t in (1, -1)]
-        return [(a - b) / (2 * h) for a, b in zip(*ends, strict=True)]
+        after, before = (of([v + t * h * (k == j) for k, v in enumerate(x)]) for t in (1, -1))
+        return [(a - b) / (2 * h) for a, b in zip(after, before, strict=True)]
 
     x = args[:n]
     if r.part is Part.VALUE:
@@ -382,7 +382,7 @@ class Walk:
         args = []
         for a in n.args:
             args.append((yield self._at(a, q)))
-        return _UNARY[n.op](*args) if len(args) == 1 else _BINARY[n.op](*args)
+        return _UNARY[n.op](args[0]) if len(args) == 1 else _BINARY[n.op](args[0], args[1])
 
     def _results(self, r: Routine, operands: Vector, q: int) -> Vector:
         if isinstance(r, Reduction):

@@ -62,8 +62,9 @@ def by_square(
     square, half = n.args[0].args[1], g.const(Fraction(1, 2))
     kinked = g.branch(n.args[0], weighted, g.zero)
     if exists:
-        smooth = _is_smooth(g, *derivatives, square, _ROUNDED)
-        limit = g.branch(smooth, g.mul(half, derivatives[1]), kinked)
+        slope, curvature = derivatives
+        smooth = _is_smooth(g, slope, curvature, square, _ROUNDED)
+        limit = g.branch(smooth, g.mul(half, curvature), kinked)
     else:
         limit = _limit(g, n, derivatives, kinked, weighted, fixed)
     return g.branch(g.compare(Op.LT, square, g.const(_SMALL)), limit, weighted)

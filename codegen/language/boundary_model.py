@@ -162,9 +162,10 @@ class FacetModel(NodalFields):
     @property
     def size(self) -> Any:
         """Volume of a cell, the mean of both, per area of the facet: a length."""
-        parent = {"tri": (1, 4), "quad": (2, 1), "tet": (1, 3), "hex": (2, 1)}[shape_of(self.cell)]
+        quarter, third, two = sp.Rational(1, 4), sp.Rational(1, 3), sp.Integer(2)
+        sizes = {"tri": quarter, "quad": two, "tet": third, "hex": two}
         volumes = sum(side[2] for side in self._sides) / len(self._sides)
-        return sp.Rational(*parent) * volumes / self._area
+        return sizes[shape_of(self.cell)] * volumes / self._area
 
     def jump(self, value: Any) -> Any:
         """A value in the first cell less that in the second; on a side of the mesh the value."""

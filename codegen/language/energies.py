@@ -58,8 +58,8 @@ def _yeoh(I1bar: Any, _: Any, *c: Any) -> Any:
 
 def _arruda_boyce(I1bar: Any, _: Any, mu: Any, lambda_m: Any) -> Any:
     return mu * sum(
-        sp.Rational(*c) * (I1bar**i - 3**i) / lambda_m ** (2 * i - 2)
-        for i, c in enumerate(_INVERSE_LANGEVIN, 1)
+        sp.Rational(p, q) * (I1bar**i - 3**i) / lambda_m ** (2 * i - 2)
+        for i, (p, q) in enumerate(_INVERSE_LANGEVIN, 1)
     )
 
 

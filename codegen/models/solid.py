@@ -39,7 +39,8 @@ def _energy(m: Model, label: str, F: kin.Gradient, material: Any) -> Any:
 def _isochoric(m: Model, label: str, F: kin.Gradient, term: energies.Term, bars: Any) -> Any:
     """The isochoric term; bars: I1bar and I2bar."""
     if term.of == "invariants":
-        return term(*bars)
+        I1bar, I2bar = bars
+        return term(I1bar, I2bar)
     return m.principal(f"isochoric{label}", kin.isochoric_right_cauchy_green(m, label, F), term)
 
 

@@ -103,8 +103,9 @@ def _differs(values: Sequence[Vector], rows: Sequence[Vector], direction: Vector
     for h, plus, minus in zip(LENGTHS, values[1::2], values[2::2], strict=True):
         differences = [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
         errors.append([f - math.fsum(t) for f, t in zip(differences, terms, strict=True)])
+    coarse, fine = errors
     allowed = [BOUND * (s + BOUND * max(sizes)) for s in sizes]
     return any(
         min(abs(one), abs(two)) > a and abs(one - two) < abs(one) / 10
-        for one, two, a in zip(*errors, allowed, strict=True)
+        for one, two, a in zip(coarse, fine, allowed, strict=True)
     )

@@ -317,8 +317,10 @@ class _View:
         """Size of each row: |R_i|, or the sum of |K_ij w_j| where the tangent is offered."""
         if self._rows is None:
             page = self.page
-            both = [self.expected(t, page) for t in (abi.Task.RESIDUAL, abi.Task.PRODUCT)]
-            rows = [max(abs(r), abs(p)) for r, p in zip(*both, strict=True)]
+            residual, product = (
+                self.expected(t, page) for t in (abi.Task.RESIDUAL, abi.Task.PRODUCT)
+            )
+            rows = [max(abs(r), abs(p)) for r, p in zip(residual, product, strict=True)]
             if self._offered(abi.Task.TANGENT):
                 sizes = self._sizes([math.fsum(map(abs, row)) for row in self._tangent()])
                 rows = [max(a, b) for a, b in zip(rows, sizes, strict=True)]

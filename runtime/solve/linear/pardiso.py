@@ -109,8 +109,18 @@ class _Handle:
         self._data = np.empty(0)
         self.perturbed = 0
         nothing = np.empty(0)
-        release = (self._memory, self._settings, structure, nothing, nothing, nothing)
-        weakref.finalize(self, _call, _RELEASE, *release).atexit = False
+        release = weakref.finalize(
+            self,
+            _call,
+            phase=_RELEASE,
+            memory=self._memory,
+            settings=self._settings,
+            structure=structure,
+            data=nothing,
+            b=nothing,
+            x=nothing,
+        )
+        release.atexit = False
 
     def factorise(self, K: SparseMatrix, schur: Array) -> None:
         """Factorise a matrix of the pattern; the Schur complement (m, m) is written to `schur`."""
