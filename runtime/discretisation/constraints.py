@@ -245,17 +245,49 @@ def require_prescribed(
         )
 
 
-def dependent_tie(ties: Integers, prescribed: Flags) -> int | None:
-    """The first unknown of ties (t, 3) one of which follows from the others, None without any.
+def require_independent_ties(assembler: Assembler, prescribed: Flags) -> None:
+    """Raise ProblemError that names a tie which follows from others: they form a circle.
 
-    Ties form a circle: all prescribed unknowns are as one.
+    prescribed: (n,) flags; all prescribed unknowns are as one.
+    """
+    first = 0
+    number = dependent_tie(tie_dofs(assembler), prescribed)
+    if number is None:
+        return
+    for block in assembler.blocks:
+        if isinstance(block.kernel, Tie):
+            if number < first + len(block.dofs):
+                position = ", ".join(f"{x:.4g}" for x in block.coordinates[number - first])
+                raise ProblemError(
+                    f"{block.name}: the node at ({position}) is tied in a circle, so that one tie "
+                    "follows from the others: leave one of them out"
+                )
+            first += len(block.dofs)
+
+
+def dependent_tie(ties: Integers, prescribed: Flags) -> int | None:
+    """The number of the first of ties (t, 3) that closes a circle of ties, None without any.
+
+    Equations of a circle are dependent: every engine would meet a singular matrix.
     """
     n = len(prescribed)
     node = np.where(np.append(prescribed, True), n, np.arange(n + 1))
-    groups = tied_groups(node[ties[:, 0]], node[ties[:, 1]], n + 1)
-    edges = np.bincount(groups[node[ties[:, 0]]], minlength=n + 1)
-    members = np.bincount(groups, minlength=n + 1)
-    dependent = np.flatnonzero((edges >= members) & (edges > 0))
-    if not len(dependent):
+    a, b = node[ties[:, 0]], node[ties[:, 1]]
+    groups = tied_groups(a, b, n + 1)
+    n_edges = np.bincount(groups[a], minlength=n + 1)
+    n_members = np.bincount(groups, minlength=n + 1)
+    if not ((n_edges > 0) & (n_edges >= n_members)).any():
         return None
-    return int(np.flatnonzero((groups[node] == dependent[0])[:n])[0])
+    parents: dict[int, int] = {}
+    for k, pair in enumerate(zip(a.tolist(), b.tolist(), strict=True)):
+        one, other = (_root(parents, x) for x in pair)
+        if one == other:
+            return k
+        parents[one] = other
+    return None
+
+
+def _root(parents: dict[int, int], x: int) -> int:
+    while x in parents:
+        x = parents[x]
+    return x

@@ -14,13 +14,12 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.discretisation.constraints import Constraints, dependent_tie, tie_dofs
+from softehl.runtime.discretisation.constraints import Constraints, tie_dofs
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Tie
 from softehl.runtime.discretisation.matrix_free_products import ElementProduct
 from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
-from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.solve.linear.coarse_grid_solver import coarse_solver
 from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.linear.krylov import conjugate_gradients, minimal_residuals
@@ -57,18 +56,9 @@ class TieForces:
 
     @classmethod
     def of(cls, problem: Problem, levels: Sequence[Integers]) -> TieForces:
-        """Of a problem, for levels of unknowns of these numbers.
-
-        Raises ProblemError where a tie follows from others.
-        """
+        """Of a problem, for levels of unknowns of these numbers."""
         constraints, n = problem.constraints, problem.assembler.size
         ties = tie_dofs(problem.assembler)
-        dependent = dependent_tie(ties, constraints.prescribed)
-        if dependent is not None:
-            raise ProblemError(
-                f"tie: {problem.name_of(dependent)} is tied in a circle, so that one tie follows "
-                "from the others: leave one of them out"
-            )
         a, b, forces = ties.T
         t, ones = len(ties), np.ones(len(ties))
         rows = np.tile(np.arange(t), 2)

@@ -17,9 +17,11 @@ from softehl.runtime.definition.problem_definition import (
     StudyError,
 )
 from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.constraints import require_independent_ties
 from softehl.runtime.discretisation.dofmap import ElementUnknowns, Numbering
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Spring, Tie
+from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.equations.contact_setup import contact_of, with_contacts
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.face_matching import match_faces
@@ -58,10 +60,12 @@ def build_system(
     blocks = [writer.page(b) for b in pages] + [writer.force(f) for f in forces if len(f.nodes)]
     contacts = {t.name: contact_of(definition, numbering, t) for t in definition.contacts}
     blocks += [block for contact in contacts.values() for block in contact.empty()]
+    assembler = Assembler.build(layout.total, blocks)
+    _require_independent_ties(definition, numbering, assembler)
     system = System(
         mesh,
         writer.numbering,
-        Assembler.build(layout.total, blocks),
+        assembler,
         dict(definition.blocks),
         (*definition.conditions,),
         implied,
@@ -118,6 +122,20 @@ def _forces(
             force = replace(force, nodes=force.nodes[~both])
         forces.append(force)
     return (*forces,), (*implied,)
+
+
+def _require_independent_ties(
+    definition: ProblemDefinition, numbering: Numbering, assembler: Assembler
+) -> None:
+    """Raise StudyError where ties, and what is prescribed, form a circle."""
+    prescribed: Flags = np.zeros(assembler.size, dtype=bool)
+    for condition in definition.conditions:
+        dofs = numbering.nodal[condition.name][condition.nodes]
+        prescribed[dofs[dofs >= 0]] = True
+    try:
+        require_independent_ties(assembler, prescribed)
+    except ProblemError as error:
+        raise StudyError(str(error)) from None
 
 
 def _require(

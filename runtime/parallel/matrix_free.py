@@ -28,7 +28,6 @@ from softehl.runtime.discretisation.matrix_free_products import (
 )
 from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
-from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.solve.newton import Newton
@@ -125,14 +124,6 @@ def levels_of(
     return MultigridLevels.of(points, dofmap, pages, order=order, size=system.size, threads=threads)
 
 
-def ties_of(problem: Problem, levels: MultigridLevels) -> TieForces:
-    """Ties of a problem on all levels.  Raises StudyError where one follows from others."""
-    try:
-        return TieForces.of(problem, levels.unknowns)
-    except ProblemError as error:
-        raise StudyError(str(error)) from None
-
-
 class _MatrixFreeCommunicator(Communicator):
     """Communicator of one process, without matrices."""
 
@@ -185,8 +176,8 @@ class MatrixFreeProblem:
 
     @cached_property
     def ties(self) -> TieForces:
-        """Ties of all its steps.  Raises StudyError where one follows from others."""
-        return ties_of(self.problem, self.levels)
+        """Ties of all its steps."""
+        return TieForces.of(self.problem, self.levels.unknowns)
 
     def residual(self, x: Array) -> Array:
         """See `Problem`."""

@@ -21,7 +21,7 @@ from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.mpi import petsc, world
 from softehl.runtime.parallel.halo_exchange import HaloExchange
-from softehl.runtime.parallel.matrix_free import TOLERANCE, ties_of
+from softehl.runtime.parallel.matrix_free import TOLERANCE
 from softehl.runtime.parallel.petsc_matrix import PetscSolver, SolverTimes
 from softehl.runtime.solve.linear.coarse_grid_solver import DIRECT_BELOW
 from softehl.runtime.solve.linear.multigrid import DEGREE
@@ -47,7 +47,7 @@ class MatrixFreeShell:
     def __post_init__(self) -> None:
         """An empty shell."""
         self.constrained = self.problem.constraints.prescribed[self.exchange.owned]
-        self.ties = ties_of(self.problem, self.levels)
+        self.ties = alone.TieForces.of(self.problem, self.levels.unknowns)
         sizes = self.exchange.vector.getSizes()
         self.matrix = petsc().Mat().createPython((sizes, sizes), self, comm=world())
         self.matrix.setUp()

@@ -82,13 +82,20 @@ def test_groups_are_the_connected_unknowns(n_ties: int, rng: np.random.Generator
 
 
 @pytest.mark.parametrize(
-    ("extra", "fixed", "unknown"),
-    [([5, 7, 9], [], 2), ([0, 0, 9], [], 0), ([5, 4, 9], [8, 7], 2), ([5, 4, 9], [8], None)],
+    ("extra", "fixed", "number"),
+    [
+        *(([5, 7, 9], [], 3), ([0, 0, 9], [], 3), ([5, 4, 9], [8, 7], 3)),
+        *(([5, 4, 9], [8], None), ([6, 0, 9], [8, 4], 2)),
+    ],
 )
-def test_a_tie_that_follows_from_others(
-    extra: list[int], fixed: list[int], unknown: int | None
+def test_the_tie_that_closes_a_circle(
+    extra: list[int], fixed: list[int], number: int | None
 ) -> None:
+    """As the rank of the equations without prescribed unknowns falls."""
     prescribed = np.zeros(N, dtype=bool)
     prescribed[fixed] = True
-    assert dependent_tie(np.vstack([TIES, extra]), prescribed) == unknown
-    assert dependent_tie(TIES, prescribed) is None
+    ties = np.vstack([TIES, extra])
+    assert dependent_tie(ties, prescribed) == number
+    B = (np.eye(N)[ties[:, 0]] - np.eye(N)[ties[:, 1]])[:, ~prescribed]
+    ranks = [int(np.linalg.matrix_rank(B[:k])) for k in range(1, len(B) + 1)]
+    assert next((k for k, rank in enumerate(ranks) if rank == k), None) == number
