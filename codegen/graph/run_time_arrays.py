@@ -30,9 +30,10 @@ Functions = Mapping[str, Callable[[Number], Number]]
 
 @dataclass(frozen=True)
 class ArrayLayout:
-    """Meaning of the numbers of an array. kind: in a manifest."""
+    """Meaning of the numbers of an array. kind: in a manifest; content: in a line."""
 
     kind: ClassVar[str]
+    content: ClassVar[str] = "its numbers"
 
     @property
     def options(self) -> dict[str, Any]:
@@ -92,6 +93,7 @@ class TableLayout(ArrayLayout):
     """
 
     kind: ClassVar[str] = "table"
+    content: ClassVar[str] = "knots, then rows of coefficients, as softehl.Table(x, y).numbers"
     interpolation: str = "linear"
     outside: str = "constant"
 
@@ -213,6 +215,7 @@ class NetworkLayout(ArrayLayout):
     """
 
     kind: ClassVar[str] = "network"
+    content: ClassVar[str] = "layer by layer the weights (to, from) row by row, then the biases"
     inputs: int
     layers: tuple[int, ...]
     activation: str

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib.resources import files as resources
 
 from softehl.codegen import abi, external_function, pipeline
-from softehl.codegen.abi import Task
+from softehl.codegen.abi import ARRAY_ENTRIES, Task
 from softehl.codegen.emit import c_source
 from softehl.codegen.emit.c_printer import number
 from softehl.codegen.hosts.element_interface import ElementInterface
@@ -108,6 +108,11 @@ def argument_rows(
     for label, arguments in groups.items():
         for k, a in enumerate(arguments):
             yield f"{entry.format(label, k + base)}  {a.name}: {a.meaning}"
+    for k, a in enumerate(d.arrays):
+        first = len(d.parameters) + ARRAY_ENTRIES * k + base
+        places = ", ".join(entry.format("p", first + i) for i in range(ARRAY_ENTRIES))
+        yield f"{places}  place in p and length of {a.name}, and 0; {a.meaning}:"
+        yield f"    {a.layout.content}"
     for k, (name, _) in enumerate(d.fields):
         yield f"{entry.format('fields', k + base)}  {name}"
 

@@ -62,15 +62,15 @@ def in_order(block: ElementBlock, parameters: Any) -> Array:
 
 def _with_arrays(block: ElementBlock, parameters: Any) -> Array:
     """Parameters of a block that has curves or networks, with these behind them."""
-    kernel = block.kernel
-    assert isinstance(kernel, Kernel)
+    kernel: Any = block.kernel  # or one around it, which has the same arguments
     names = [*kernel.parameters, *(a.name for a in kernel.arrays)]
     if isinstance(parameters, Mapping):
         require_known(f"parameter of block {block.name!r}", parameters, names)
         missing = [name for name in names if name not in parameters]
         if missing:
             raise ProblemError(f"block {block.name!r} needs {', '.join(missing)} too")
-        return kernel.with_arrays([parameters[name] for name in kernel.parameters], parameters)
+        numbers = [parameters[name] for name in kernel.parameters]
+        return np.asarray(kernel.with_arrays(numbers, parameters))
     values = np.asarray(parameters, dtype=np.float64)
     if not is_packed(values, len(kernel.parameters), len(kernel.arrays)):
         raise ProblemError(
@@ -179,11 +179,10 @@ def table_ends(block: ElementBlock, x: Array, parameters: Array) -> str:
 
     They are those whose continuation makes more elements finite.
     """
-    kernel = block.kernel
+    kernel: Any = block.kernel
     names = [a.name for a in getattr(kernel, "arrays", ()) if a.kind == "table"]
     if not names:
         return ""
-    assert isinstance(kernel, Kernel)
     before = len(rows_not_finite(block.tangent(x, parameters)))
     continued = parameters.copy()
     arrays = unpacked(continued, len(kernel.parameters), len(kernel.arrays))

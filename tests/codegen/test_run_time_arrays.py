@@ -22,6 +22,8 @@ from softehl.codegen.verify import verification
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.kernels.kernel_call import ArgumentError
 from softehl.runtime.kernels.run_time_arrays import ArrayDataError
+from tests.codegen.hosts.workshop import errors as host_errors
+from tests.codegen.hosts.workshop import folder, made
 from tests.codegen.workshop import compiled
 
 X = [[0.5], [2.0]]
@@ -249,6 +251,14 @@ def test_hosts_that_hand_no_arrays_over_refuse() -> None:
     for target in ("abaqus", "ngsolve"):
         with pytest.raises(softehl.TargetError, match=f"k at run time, which target {target}"):
             files(spring(lambda m, u: m.table("k", u)), target)
+
+
+def test_a_folder_of_c_tests_itself_with_its_arrays(tmp_path: Path) -> None:
+    done = made(folder(body.definition("tri3"), "c", tmp_path))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert max(host_errors(done.stdout)[:4]) < 1e-12
+    header = (tmp_path / "body_tri3.h").read_text(encoding="utf-8")
+    assert "p[0], p[1], p[2]  place in p and length of W, and 0" in header
 
 
 def test_tables_say_what_they_are() -> None:

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from softehl import Kernel, Mesh, Study, load_kernel
+from softehl import Kernel, Mesh, Study, initial_weights, load_kernel
 from softehl.runtime.arrays import Array
 from softehl.runtime.results.result import Result
 from tests.crossings import pages
@@ -71,16 +71,16 @@ CELLS = {
 class Law:
     """A way to write the body: a page or a material, its constants, what is known of it."""
 
-    given: dict[str, float]
+    given: dict[str, Any]
     page: Any = None
     material: Any = None
     small: bool = False
     history: bool = False
     parameter: str = "mu"
 
-    def constants(self, stress: float = 1.0) -> dict[str, float]:
+    def constants(self, stress: float = 1.0) -> dict[str, Any]:
         """Arguments of `Study.add` in another unit of stress."""
-        pure = {"nu", "alpha_1", "alpha_2", "alpha_3"}
+        pure = {"nu", "alpha_1", "alpha_2", "alpha_3", "W", "U"}
         return {n: v if n in pure else stress * v for n, v in self.given.items()}
 
     def add(
@@ -111,6 +111,14 @@ class Law:
 _RUBBER = {"mu": 0.4, "lame": 0.6}
 _MIXED = {"mu": 0.4, "K": 5.0}
 _OGDEN = {"mu_1": 0.5, "alpha_1": 1.6, "mu_2": -0.04, "alpha_2": -2.0, "mu_3": 0.01, "alpha_3": 4.0}
+_STRETCHES = np.linspace(0.4, 2.2, 19)
+_WEIGHTS = initial_weights(1, (3,), convex=True, monotone=True, seed=2)
+_WEIGHTS[-1][1][:] = -np.log(2.0) * _WEIGHTS[-1][0].sum()  # no energy at rest
+_LEARNED = {
+    **_RUBBER,
+    "W": _WEIGHTS,
+    "U": (_STRETCHES, (_STRETCHES - 1.0) ** 2),
+}
 _MODELS = Path(__file__).parents[2] / "docs" / "models"
 
 LAWS = {
@@ -125,6 +133,7 @@ LAWS = {
     "neo_hooke": Law({"mu": 0.4, "kappa": 0.9}, material="neo_hooke"),
     "ogden": Law({**_OGDEN, "kappa": 0.9}, material="ogden", parameter="mu_1"),
     "hooke": Law({"E": 1.0, "nu": 0.3}, material="hooke", small=True, parameter="E"),
+    "learned": Law(_LEARNED, pages.learned),
     "mixed": Law(_MIXED, pages.mixed),
     "condensed": Law(_MIXED, pages.condensed),
     "taylor-hood": Law(_MIXED, pages.taylor_hood),

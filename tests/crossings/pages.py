@@ -53,6 +53,17 @@ def point(m):
     _minimised(m)
 
 
+@softehl.page
+def learned(m):
+    """A network of an invariant and a curve of the volume, whose numbers are given at run time."""
+    F = m.deformation_gradient(m.vector("u"))
+    J = m.define("J", F.det())
+    mu, lame = m.parameters(**RUBBER)
+    I1 = m.define("I1", (F.T * F).trace() * J ** sp.Rational(-2, 3) - 3)
+    W = m.network("W", [I1], layers=(3,), convex=True, monotone=True)
+    m.minimise(mu * W + lame * m.table("U", J, interpolation="spline", outside="linear"))
+
+
 @softehl.material
 def stress_law(m):
     """The body by the stress of its material."""
