@@ -5,14 +5,12 @@ from __future__ import annotations
 import enum
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from tests.reference import solids
-from tests.reference.differentiate import mpf
-from tests.reference.states import displacement, quad
+from tests.reference import oracles
+from tests.reference.states import State, displacement, quad
 
 TOLERANCE = 1e-12
 MATERIAL = (3.04, 0.62, 500.0)
@@ -76,14 +74,13 @@ def elements(count: int = 256, seed: int = 2009) -> Elements:
 def reference(case: Case, count: int = 3) -> Result:
     """The first `count` elements to 50 digits and more (mpmath), rounded to double."""
     given = elements()
-    forces = solids.residual_fbar if case.fbar else solids.residual_q4
-    stiffness = solids.tangent_fbar if case.fbar else solids.tangent_q4
     residual, tangent = [], []
     for X, u in zip(given.coordinates[:count], given.displacements[:count], strict=True):
-        exact: Any = [[mpf(float(v)) for v in row] for row in (X, u, given.parameters)]
-        residual.append([float(v) for v in forces(*exact)])
+        family = "solid_fbar" if case.fbar else "solid_q4"
+        state = State(family, "", tuple(X), tuple(u), tuple(given.parameters))
+        residual.append([float(v) for v in oracles.residual(state)])
         if case.tangent:
-            tangent.append([[float(v) for v in row] for row in stiffness(*exact)])
+            tangent.append([[float(v) for v in row] for row in oracles.tangent(state)])
     return Result(np.array(residual), np.array(tangent) if case.tangent else None)
 
 

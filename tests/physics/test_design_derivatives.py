@@ -74,7 +74,7 @@ def design(state: State) -> list[float]:
 def test_pseudo_load_agrees_with_the_reference() -> None:
     for state in STATES:
         found = called("pseudo_load", state, design(state))
-        exact = difference(oracles.RESIDUALS[state.family], state, design(state))
+        exact = difference(oracles.new_residual, state, design(state))
         errors = oracles.residual_errors(found, list(exact), state.family)
         assert oracles.agrees(errors, 1e-12), errors
 
@@ -82,8 +82,8 @@ def test_pseudo_load_agrees_with_the_reference() -> None:
 def test_rates_of_fields_agree_with_the_reference() -> None:
     for state in RATED:
         found = called("fields_rate", state, variation(state))
-        exact = difference(oracles.FIELDS[state.family], state, variation(state)).astype(float)
-        values = np.array(oracles.FIELDS[state.family](state), dtype=object).astype(float)
+        exact = difference(oracles.fields, state, variation(state)).astype(float)
+        values = np.array(oracles.fields(state), dtype=object).astype(float)
         places = load_kernel(state.family).fields_at(
             np.array([state.coordinates]),
             np.array([state.dofs]),
@@ -100,7 +100,7 @@ def test_rates_of_fields_agree_with_the_reference() -> None:
 def test_one_argument_that_does_not_move_is_noticed() -> None:
     """Every coordinate, datum and parameter has its part in the pseudo-load, or none at all."""
     for state in STATES[:9]:
-        exact = difference(oracles.RESIDUALS[state.family], state, design(state))
+        exact = difference(oracles.new_residual, state, design(state))
         noticed = 0
         for k in range(len(design(state))):
             short = [0.0 if j == k else v for j, v in enumerate(design(state))]

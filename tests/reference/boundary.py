@@ -2,43 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.differentiate import PI, Arguments, Number, Vector, mp, mpf
 from tests.reference.rules import gauss
 
 
-def residual_pressure(X: Sequence[Number], u: Sequence[Number], pressure: Number) -> Vector:
+def pressure(a: Arguments, u: Vector) -> Vector:
     """Integral of pressure n . delta u 2 pi r ds over the deformed segment, N.
 
     n ds = (dr, -dz); the integrand is a quadratic, two Gauss points integrate it exactly.
     """
-    z1, r1, z2, r2 = (a + b for a, b in zip(X, u, strict=True))
+    z1, r1, z2, r2 = (x + v for x, v in zip(a.X, u, strict=True))
     forces = [mpf(0)] * 4
     for xi, weight in zip(*gauss(2), strict=True):
         shapes = ((1 - xi) / 2, (1 + xi) / 2)
-        ring = 2 * PI * (shapes[0] * r1 + shapes[1] * r2) * weight * pressure
-        for a in (0, 1):
-            forces[2 * a] += ring * shapes[a] * (r2 - r1) / 2
-            forces[2 * a + 1] -= ring * shapes[a] * (z2 - z1) / 2
+        ring = 2 * PI * (shapes[0] * r1 + shapes[1] * r2) * weight * a.parameters[0]
+        for k in (0, 1):
+            forces[2 * k] += ring * shapes[k] * (r2 - r1) / 2
+            forces[2 * k + 1] -= ring * shapes[k] * (z2 - z1) / 2
     return forces
 
 
-def tangent_pressure(X: Sequence[Number], u: Vector, pressure: Number) -> Matrix:
-    """Differences of the residual."""
-    return jacobian(lambda v: residual_pressure(X, v, pressure), u)
-
-
-def residual_contact(
-    X: Sequence[Number],
-    dofs: Sequence[Number],
-    data: Sequence[Number],
-    parameters: Sequence[Number],
-) -> Vector:
+def contact(a: Arguments, dofs: Vector) -> Vector:
     """Node against an obstacle: (u_z, u_r, lambda) with gap g and augmented pressure l + rho g."""
-    n_z, n_r, c, area, rho = data
-    offset, force_weight = parameters
-    gap = n_z * (X[0] + dofs[0]) + n_r * (X[1] + dofs[1]) - c - offset
+    n_z, n_r, c, area, rho = a.data
+    offset, force_weight = a.parameters
+    gap = n_z * (a.X[0] + dofs[0]) + n_r * (a.X[1] + dofs[1]) - c - offset
     augmented = dofs[2] + rho * gap
     if augmented > 0:
         return [mpf(0), mpf(0), -area * dofs[2] / rho]
@@ -46,27 +34,15 @@ def residual_contact(
     return [push * n_z, push * n_r, area * gap]
 
 
-def tangent_contact(
-    X: Sequence[Number], dofs: Vector, data: Sequence[Number], parameters: Sequence[Number]
-) -> Matrix:
-    """Differences of the residual (the state must not sit on the switch)."""
-    return jacobian(lambda v: residual_contact(X, v, data, parameters), dofs)
-
-
-def residual_friction(
-    X: Sequence[Number],
-    dofs: Sequence[Number],
-    data: Sequence[Number],
-    parameters: Sequence[Number],
-) -> Vector:
+def friction(a: Arguments, dofs: Vector) -> Vector:
     """(u_z, u_r, lambda, tau): open, sticking where |tau + rho s| <= mu p, else slipping."""
-    n_z, n_r, c, area, rho, z_old, r_old = data
-    offset, friction = parameters
-    normal = dofs[2] + rho * (n_z * (X[0] + dofs[0]) + n_r * (X[1] + dofs[1]) - c - offset)
+    n_z, n_r, c, area, rho, z_old, r_old = a.data
+    offset, coefficient = a.parameters
+    normal = dofs[2] + rho * (n_z * (a.X[0] + dofs[0]) + n_r * (a.X[1] + dofs[1]) - c - offset)
     if normal > 0:
         return [mpf(0), mpf(0), -area * dofs[2] / rho, -area * dofs[3] / rho]
     slip = n_r * (dofs[0] - z_old) - n_z * (dofs[1] - r_old)
-    along, most = dofs[3] + rho * slip, -friction * normal
+    along, most = dofs[3] + rho * slip, -coefficient * normal
     equation = area * slip
     if abs(along) > most:
         along = most if along > 0 else -most
@@ -75,54 +51,19 @@ def residual_friction(
     return [*forces, area * (normal - dofs[2]) / rho, equation]
 
 
-def tangent_friction(
-    X: Sequence[Number], dofs: Vector, data: Sequence[Number], parameters: Sequence[Number]
-) -> Matrix:
-    """Differences of the residual (the state must not sit on a switch)."""
-    return jacobian(lambda v: residual_friction(X, v, data, parameters), dofs)
-
-
-def distance(z: Number, r: Number, wall: Number, lip: Number, fillet: Number) -> Vector:
-    """Signed distance of (z, r) from the corner and its gradient, case by case."""
+def distance(z: Number, r: Number, wall: Number, lip: Number, fillet: Number) -> Number:
+    """Signed distance of (z, r) from the corner, case by case."""
     to_z, to_r = z - (wall + fillet), r - (lip + fillet)  # from the centre of the fillet
     if to_z < 0 and to_r < 0:
-        radius = mp.sqrt(to_z**2 + to_r**2)
-        return [radius - fillet, to_z / radius, to_r / radius]
+        return mp.sqrt(to_z**2 + to_r**2) - fillet
     before_wall, below_lip = wall - z, lip - r
     nearer = before_wall > below_lip if to_z >= 0 and to_r >= 0 else to_z < 0
-    return [before_wall, mpf(-1), mpf(0)] if nearer else [below_lip, mpf(0), mpf(-1)]
+    return before_wall if nearer else below_lip
 
 
-def residual_corner(
-    X: Sequence[Number],
-    dofs: Sequence[Number],
-    data: Sequence[Number],
-    parameters: Sequence[Number],
-) -> Vector:
-    """(u_z, u_r, lambda) of a node against the rounded corner."""
-    area, rho = data
-    gap, n_z, n_r = distance(X[0] + dofs[0], X[1] + dofs[1], *parameters)
-    augmented = dofs[2] + rho * gap
-    if augmented > 0:
-        return [mpf(0), mpf(0), -area * dofs[2] / rho]
-    return [area * augmented * n_z, area * augmented * n_r, area * gap]
-
-
-def tangent_corner(
-    X: Sequence[Number], dofs: Vector, data: Sequence[Number], parameters: Sequence[Number]
-) -> Matrix:
-    """Differences of the residual (the state must not sit on a switch)."""
-    return jacobian(lambda v: residual_corner(X, v, data, parameters), dofs)
-
-
-def energy_corner(
-    X: Sequence[Number],
-    dofs: Sequence[Number],
-    data: Sequence[Number],
-    parameters: Sequence[Number],
-) -> Number:
-    """lambda g + rho g^2 / 2 in contact, else -lambda^2 / (2 rho), times the area."""
-    area, rho = data
-    gap = distance(X[0] + dofs[0], X[1] + dofs[1], *parameters)[0]
+def corner(a: Arguments, dofs: Vector) -> Number:
+    """lambda g + rho g^2 / 2 in contact, else -lambda^2 / (2 rho), times the area, N mm."""
+    area, rho = a.data
+    gap = distance(a.X[0] + dofs[0], a.X[1] + dofs[1], *a.parameters)
     closed = dofs[2] + rho * gap <= 0
     return area * (dofs[2] * gap + rho * gap**2 / 2 if closed else -(dofs[2] ** 2) / (2 * rho))

@@ -8,6 +8,7 @@ the rounding error of a nested (second) difference about 1e-60.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from mpmath import MPContext
@@ -21,6 +22,19 @@ PI = +mp.pi
 Number = Any  # mpmath ships no types
 Vector = list[Any]
 Matrix = list[list[Any]]
+Potential = Callable[[Vector], Number]
+"""Energy of an element by its unknowns."""
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Exact arguments of an element beside its unknowns; kind, count: the rule of a film."""
+
+    X: Vector
+    parameters: Vector
+    data: Vector
+    kind: str = ""
+    count: int = 0
 
 
 def numbers(values: Iterable[float]) -> Vector:

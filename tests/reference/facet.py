@@ -8,11 +8,10 @@ Written as the bilinear expression itself, evaluated for one test function after
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from tests.reference.differentiate import Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.differentiate import Arguments, Matrix, Number, Vector, mp, mpf
 from tests.reference.rules import lagrange, lobatto
 
 MOVED = 6
@@ -41,11 +40,11 @@ def _ends(order: int) -> tuple[tuple[Vector, Vector], tuple[Vector, Vector]]:
     return lagrange(nodes, mpf(1)), lagrange(nodes, mpf(-1))
 
 
-def sides(X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number]) -> list[Side]:
+def sides(a: Arguments, dofs: Vector) -> list[Side]:
     """The segment that ends at the facet, then the one that begins there."""
-    rod_radius, speed, eta_0, alpha = parameters
-    z = [X[k] + dofs[k] for k in (0, 2, 4)]
-    h = X[3] + dofs[3] - rod_radius
+    rod_radius, speed, eta_0, alpha = a.parameters
+    z = [a.X[k] + dofs[k] for k in (0, 2, 4)]
+    h = a.X[3] + dofs[3] - rod_radius
     count = (len(dofs) - MOVED) // 2
     pressures = (dofs[MOVED : MOVED + count], dofs[MOVED + count :])
     result = []
@@ -65,11 +64,9 @@ def sides(X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Numb
     return result
 
 
-def residual_facet(
-    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number]
-) -> Vector:
+def residual(a: Arguments, dofs: Vector) -> Vector:
     """[p n] <dq> - [dp n] <q>, and no force on the solid."""
-    both = sides(X, dofs, parameters)
+    both = sides(a, dofs)
     jump = sum(side.trace * side.normal for side in both)
     flux = sum(side.flux for side in both) / 2
     rows: Vector = [mpf(0)] * MOVED
@@ -80,16 +77,9 @@ def residual_facet(
     return rows
 
 
-def tangent_facet(X: Sequence[Number], dofs: Vector, parameters: Sequence[Number]) -> Matrix:
-    """Differences of the residual."""
-    return jacobian(lambda v: residual_facet(X, v, parameters), dofs)
-
-
-def fields_facet(
-    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number]
-) -> Matrix:
+def fields(a: Arguments, dofs: Vector) -> Matrix:
     """x h jump flux flux_jump."""
-    minus, plus = sides(X, dofs, parameters)
-    h = X[3] + dofs[3] - parameters[0]
+    minus, plus = sides(a, dofs)
+    h = a.X[3] + dofs[3] - a.parameters[0]
     mean = (minus.flux + plus.flux) / 2
-    return [[X[2] + dofs[2], h, minus.trace - plus.trace, mean, minus.flux - plus.flux]]
+    return [[a.X[2] + dofs[2], h, minus.trace - plus.trace, mean, minus.flux - plus.flux]]

@@ -7,11 +7,11 @@ shear_weight, then those of `tests.reference.rheology`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
-from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.differentiate import PI, Arguments, Matrix, Number, Vector, mp, mpf
 from tests.reference.rheology import thinned
 from tests.reference.rules import lagrange, lobatto, rule
 
@@ -46,22 +46,20 @@ def _tables(order: int, kind: str, count: int) -> list[tuple[Number, Number, Vec
     ]
 
 
-def film_points(
-    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number], kind: str, count: int
-) -> Iterator[FilmPoint]:
+def film_points(a: Arguments, dofs: Vector) -> Iterator[FilmPoint]:
     """All quadrature points of the segment; what follows seven parameters is how the oil thins."""
-    rod_radius, speed, eta_0, alpha = parameters[:4]
-    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    rod_radius, speed, eta_0, alpha = a.parameters[:4]
+    z1, r1, z2, r2 = (a.X[i] + dofs[i] for i in range(4))
     pressures = dofs[4:]
     half_z, half_r = (z2 - z1) / 2, (r2 - r1) / 2
-    for xi, weight, basis, slopes in _tables(len(pressures) - 1, kind, count):
+    for xi, weight, basis, slopes in _tables(len(pressures) - 1, a.kind, a.count):
         one, two = (1 - xi) / 2, (1 + xi) / 2
         r = one * r1 + two * r2
         h = r - rod_radius
         p = mp.fdot(basis, pressures)
         slope = mp.fdot(slopes, pressures) / _along(half_z, half_r)
         eta = eta_0 * mp.exp(alpha * p)
-        middle, driving = thinned(speed, h, eta, slope, parameters[7:])
+        middle, driving = thinned(speed, h, eta, slope, a.parameters[7:])
         yield FilmPoint(
             shapes=(one, two),
             test=basis,
@@ -88,36 +86,25 @@ def _along(half_z: Number, half_r: Number) -> Number:
     return mp.hypot(half_z, half_r * sine**4)
 
 
-def residual_film(
-    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number], kind: str, count: int
-) -> Vector:
+def residual(a: Arguments, dofs: Vector) -> Vector:
     """Forces of (18) on the two nodes (N), then the Reynolds rows (25)."""
-    penalty, force_weight, shear_weight = parameters[4:7]
+    penalty, force_weight, shear_weight = a.parameters[4:7]
     forces, rows = [mpf(0)] * 4, [mpf(0)] * (len(dofs) - 4)
-    for at in film_points(X, dofs, parameters, kind, count):
+    for at in film_points(a, dofs):
         pull = (at.p * at.n_ds[0] - shear_weight * at.tau * at.ds, at.p * at.n_ds[1])
-        for a in (0, 1):
+        for end in (0, 1):
             for k in (0, 1):
-                forces[2 * a + k] += force_weight * pull[k] * at.shapes[a] * 2 * PI * at.r
+                forces[2 * end + k] += force_weight * pull[k] * at.shapes[end] * 2 * PI * at.r
         for i, (value, slope) in enumerate(zip(at.test, at.test_slope, strict=True)):
             rows[i] += (slope * at.flux + penalty * value * max(-at.p, mpf(0))) * at.dx
     return forces + rows
 
 
-def tangent_film(
-    X: Sequence[Number], dofs: Vector, parameters: Sequence[Number], kind: str, count: int
-) -> Matrix:
-    """Differences of the residual (no quadrature point may sit at p = 0)."""
-    return jacobian(lambda v: residual_film(X, v, parameters, kind, count), dofs)
-
-
-def fields_film(
-    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number], kind: str, count: int
-) -> Matrix:
+def fields(a: Arguments, dofs: Vector) -> Matrix:
     """x dx h p tau flux tau_rod eta at the quadrature points, driving where the oil thins."""
     found = []
-    for at in film_points(X, dofs, parameters, kind, count):
-        more = [at.driving] if parameters[7:] else []
+    for at in film_points(a, dofs):
+        more = [at.driving] if a.parameters[7:] else []
         found.append(
             [at.x, abs(at.dx), at.h, at.p, at.tau, at.flux, at.tau_rod, at.viscosity, *more]
         )

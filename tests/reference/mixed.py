@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
-from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.differentiate import PI, Arguments, Matrix, Number, Vector, mp, mpf
 from tests.reference.rheology import thinned
 from tests.reference.rules import gauss, lagrange, lobatto
 from tests.reference.upwind import bubble_load
@@ -95,12 +95,12 @@ class Place:
 Words = dict[str, Number]
 
 
-def places(X: Vector, dofs: Vector, data: Vector, given: Words) -> Iterator[Place]:
+def places(arguments: Arguments, dofs: Vector, given: Words) -> Iterator[Place]:
     """Two Gauss points on every subcell; `ends` are thicknesses at those of the subcell."""
-    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    z1, r1, z2, r2 = (arguments.X[i] + dofs[i] for i in range(4))
     nodes = lobatto(len(dofs[4:]) // 2)[0]
     gaps = [(1 - x) / 2 * r1 + (1 + x) / 2 * r2 - given["rod_radius"] for x in nodes]
-    w = [given["rate"] * dofs[2 * a] + data[a] for a in (0, 1)]
+    w = [given["rate"] * dofs[2 * k] + arguments.data[k] for k in (0, 1)]
     for cell, (a, b) in enumerate(pairwise(nodes)):
         for point, weight in zip(*gauss(2), strict=True):
             xi = (a + b) / 2 + (b - a) / 2 * point
@@ -193,104 +193,92 @@ def _given(parameters: Sequence[Number], rough: bool) -> Words:
     return dict(zip(ROUGH if rough else names, parameters, strict=True))
 
 
-def residual_film(
-    X: Vector, dofs: Vector, data: Vector, parameters: Sequence[Number], rough: bool
-) -> Vector:
+def residual_film(a: Arguments, dofs: Vector, rough: bool) -> Vector:
     """Forces on the nodes (N), then a row for every pressure; none for the void fractions."""
-    given = _given(parameters, rough)
+    given = _given(a.parameters, rough)
     half = len(dofs[4:]) // 2
     forces, rows = [mpf(0)] * 4, [mpf(0)] * (2 * half)
-    dz, dr = (X[2 + k] + dofs[2 + k] - X[k] - dofs[k] for k in (0, 1))
-    for at in places(X, dofs, data, given):
+    dz, dr = (a.X[2 + k] + dofs[2 + k] - a.X[k] - dofs[k] for k in (0, 1))
+    for at in places(a, dofs, given):
         film = film_at(at, dofs, given, rough)
         ring = 2 * PI * at.r * given["force_weight"] * at.weight / 2
         load, drag = film.p + film.p_a, given["shear_weight"] * film.tau * mp.hypot(dz, dr)
-        for a in (0, 1):
-            forces[2 * a] += ring * at.shapes[a] * (load * dr - drag)
-            forces[2 * a + 1] -= ring * at.shapes[a] * load * dz
+        for node, shape in enumerate(at.shapes):
+            forces[2 * node] += ring * shape * (load * dr - drag)
+            forces[2 * node + 1] -= ring * shape * load * dz
         for end, sign in ((0, -1), (1, 1)):
             rows[at.cell + end] += sign * film.flux * at.dx / at.width
     return forces + rows
 
 
-def fields_film(
-    X: Vector, dofs: Vector, data: Vector, parameters: Sequence[Number], rough: bool
-) -> Matrix:
+def fields_film(a: Arguments, dofs: Vector, rough: bool) -> Matrix:
     """x dx h p tau flux tau_rod eta h_T p_a tau_a v_out v_in at the points; see Film.rest."""
-    given = _given(parameters, rough)
+    given = _given(a.parameters, rough)
     found = []
-    for at in places(X, dofs, data, given):
+    for at in places(a, dofs, given):
         f = film_at(at, dofs, given, rough)
         known = [at.x, at.dx, at.h, f.p, f.tau, f.flux, f.tau_rod, f.eta, f.h_T, f.p_a, f.tau_a]
         found.append([*known, *f.rest])
     return found
 
 
-def residual_void(_: Vector, dofs: Vector, __: Vector, parameters: Sequence[Number]) -> Vector:
+def residual_void(arguments: Arguments, dofs: Vector) -> Vector:
     """Fischer and Burmeister, as it is printed; 1e-30 is less than the rounding of a kernel."""
-    p_c, p_ref, v_ref = parameters
+    p_c, p_ref, v_ref = arguments.parameters
     a, b = (dofs[0] - p_c) / p_ref, dofs[1] / v_ref
     return [mpf(0), a + b - mp.sqrt(a**2 + b**2)]
 
 
 def contents(
-    X: Vector, dofs: Vector, parameters: Sequence[Number], rough: bool
+    a: Arguments, dofs: Vector, rough: bool
 ) -> Iterator[tuple[Number, Number, Number, Number]]:
     """At each pressure: half the lengths of its subcells, slope z', h_T and content h_T v z'."""
     half = len(dofs[4:]) // 2
     nodes = lobatto(half)[0]
-    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    z1, r1, z2, r2 = (a.X[i] + dofs[i] for i in range(4))
     for i, xi in enumerate(nodes):
-        h = (1 - xi) / 2 * r1 + (1 + xi) / 2 * r2 - parameters[0]
-        h_T = parameters[2] * mean_gap(h / parameters[2]) if rough else h
+        h = (1 - xi) / 2 * r1 + (1 + xi) / 2 * r2 - a.parameters[0]
+        h_T = a.parameters[2] * mean_gap(h / a.parameters[2]) if rough else h
         length = (nodes[min(i + 1, half - 1)] - nodes[max(i - 1, 0)]) / 2
         slope = (z2 - z1) / 2
         yield length, slope, h_T, h_T * (1 - dofs[4 + half + i]) * slope
 
 
-def residual_squeeze(
-    X: Vector, dofs: Vector, data: Vector, parameters: Sequence[Number], rough: bool
-) -> Vector:
+def residual_squeeze(a: Arguments, dofs: Vector, rough: bool) -> Vector:
     """data: rate of the contents of the steps before, one for every pressure."""
     rows = [
-        -length * (parameters[1] * content + rest)
-        for (length, _, _, content), rest in zip(
-            contents(X, dofs, parameters, rough), data, strict=True
-        )
+        -length * (a.parameters[1] * content + rest)
+        for (length, _, _, content), rest in zip(contents(a, dofs, rough), a.data, strict=True)
     ]
     return [mpf(0)] * 4 + rows + [mpf(0)] * len(rows)
 
 
-def fields_squeeze(
-    X: Vector, dofs: Vector, _: Vector, parameters: Sequence[Number], rough: bool
-) -> Matrix:
+def fields_squeeze(a: Arguments, dofs: Vector, rough: bool) -> Matrix:
     """content dx v h_T at the pressures."""
     n = len(dofs[4:]) // 2
-    found = contents(X, dofs, parameters, rough)
+    found = contents(a, dofs, rough)
     return [
         [content, length * slope, dofs[4 + n + i], h_T]
         for i, (length, slope, h_T, content) in enumerate(found)
     ]
 
 
-def residual_upwind(X: Vector, dofs: Vector, _: Vector, parameters: Sequence[Number]) -> Vector:
+def residual_upwind(a: Arguments, dofs: Vector) -> Vector:
     """`tests.reference.upwind` with sigma Hp(h_m / sigma) for h_m."""
-    sigma, rod_radius, speed, viscosity, shear_modulus, strength, force_weight = parameters
-    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    sigma, rod_radius, speed, viscosity, shear_modulus, strength, force_weight = a.parameters
+    z1, r1, z2, r2 = (a.X[i] + dofs[i] for i in range(4))
     h = sigma * effective(((r1 + r2) / 2 - rod_radius) / sigma)
     peclet = 3 * viscosity * abs(speed) / 2 * (z2 - z1) ** 2 / (PI * shear_modulus * h**3)
     widening = 5 * (r2 - r1) / h
     weight = 1 / (1 + widening**2) if speed * widening > 0 else mpf(1)
     delta = weight * peclet**2 / (9 + peclet**2)
-    moved = force_weight * strength * delta / 2 * bubble_load(X, dofs, dofs[4:])
+    moved = force_weight * strength * delta / 2 * bubble_load(a.X, dofs, dofs[4:])
     return [mpf(0), -moved, mpf(0), moved] + [mpf(0)] * (len(dofs) - 4)
 
 
 CONSERVING = ("film_conserving", "film_conserving_eyring", "film_conserving_carreau")
 
-Residual = Callable[[Vector, Vector, Vector, Sequence[Number]], Vector]
-
-RESIDUALS: dict[str, Residual] = {
+RESIDUALS: dict[str, Callable[[Arguments, Vector], Vector]] = {
     **{name: partial(residual_film, rough=False) for name in CONSERVING},
     "film_rough": partial(residual_film, rough=True),
     "film_void": residual_void,
@@ -298,16 +286,9 @@ RESIDUALS: dict[str, Residual] = {
     "film_squeeze_rough": partial(residual_squeeze, rough=True),
     "film_upwind_rough": residual_upwind,
 }
-FIELDS: dict[str, Callable[[Vector, Vector, Vector, Sequence[Number]], Matrix]] = {
+FIELDS: dict[str, Callable[[Arguments, Vector], Matrix]] = {
     **{name: partial(fields_film, rough=False) for name in CONSERVING},
     "film_rough": partial(fields_film, rough=True),
     "film_squeeze": partial(fields_squeeze, rough=False),
     "film_squeeze_rough": partial(fields_squeeze, rough=True),
 }
-
-
-def tangent(
-    family: str, X: Vector, dofs: Vector, data: Vector, parameters: Sequence[Number]
-) -> Matrix:
-    """Differences of the residual."""
-    return jacobian(lambda v: RESIDUALS[family](X, v, data, parameters), dofs)

@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.differentiate import PI, Arguments, Matrix, Number, Vector, mp, mpf
 from tests.reference.rules import gauss
 
 Points = list[Vector]
 
 
-def residual_pair(
-    nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
-) -> Vector:
+def residual_pair(nodes: int, arguments: Arguments, dofs: Vector) -> Vector:
     """Forces at the nodes of both, then for each end of the side what lambda and tau are short of.
 
     data: displacements of the step before (all along x, all along y), rho, friction, depth, reach,
     ring. The side has the body on its left.
     """
+    X, data = arguments.X, arguments.data
     count = len(X) // 2
     old, (rho, friction, depth, reach, ring) = data[:-5], data[-5:]
     x: Points = [[X[2 * a + c] + dofs[2 * a + c] for c in (0, 1)] for a in range(count)]
@@ -56,18 +55,9 @@ def residual_pair(
     return found
 
 
-def tangent_pair(
-    nodes: int, X: Sequence[Number], dofs: Vector, data: Sequence[Number], _: object
-) -> Matrix:
-    """Differences of the residual."""
-    return jacobian(lambda v: residual_pair(nodes, X, v, data, _), dofs)
-
-
-def residual_side(
-    nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
-) -> Vector:
+def residual_side(nodes: int, arguments: Arguments, dofs: Vector) -> Vector:
     """Minus the integrals of lambda and tau over rho, each with the hats of the ends."""
-    rho, ring = data
+    X, (rho, ring) = arguments.X, arguments.data
     rest: Points = [[X[2 * a], X[2 * a + 1]] for a in range(nodes)]
     found, multipliers = [mpf(0)] * len(dofs), dofs[2 * nodes :]
     for xi, weight in zip(*gauss(3), strict=True):
@@ -79,18 +69,9 @@ def residual_side(
     return found
 
 
-def tangent_side(
-    nodes: int, X: Sequence[Number], dofs: Vector, data: Sequence[Number], _: object
-) -> Matrix:
-    """Differences of the residual."""
-    return jacobian(lambda v: residual_side(nodes, X, v, data, _), dofs)
-
-
-def fields_side(
-    nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
-) -> Matrix:
+def fields_side(nodes: int, arguments: Arguments, dofs: Vector) -> Matrix:
     """True pressure and shear stress, place, and area of each point."""
-    _, ring = data
+    X, (_, ring) = arguments.X, arguments.data
     rest: Points = [[X[2 * a], X[2 * a + 1]] for a in range(nodes)]
     moved: Points = [[X[2 * a + c] + dofs[2 * a + c] for c in (0, 1)] for a in range(nodes)]
     rows, multipliers = [], dofs[2 * nodes :]
@@ -107,10 +88,6 @@ SIDES = {f"mortar_side_{a}": a for a in (2, 3)}
 RESIDUALS = {
     **{name: partial(residual_pair, a) for name, a in FAMILIES.items()},
     **{name: partial(residual_side, a) for name, a in SIDES.items()},
-}
-TANGENTS = {
-    **{name: partial(tangent_pair, a) for name, a in FAMILIES.items()},
-    **{name: partial(tangent_side, a) for name, a in SIDES.items()},
 }
 FIELDS = {name: partial(fields_side, a) for name, a in SIDES.items()}
 

@@ -20,165 +20,113 @@ from tests.reference import (
     touch,
     upwind,
 )
-from tests.reference.differentiate import Matrix, Number, Vector, mpf, numbers
+from tests.reference.differentiate import (
+    Arguments,
+    Matrix,
+    Number,
+    Potential,
+    Vector,
+    gradient,
+    hessian,
+    jacobian,
+    mpf,
+    numbers,
+)
 from tests.reference.material import LAWS
 from tests.reference.states import State
 
 TOLERANCE = 1e-12
 Block = tuple[str, slice]
-Oracle = Callable[[State], Any]
-
-
-def _film(function: Callable[..., Any]) -> Callable[[State], Any]:
-    return lambda s: function(*_exact(s), s.kind, s.count)
-
-
-def _plain(function: Callable[..., Any]) -> Callable[[State], Any]:
-    return lambda s: function(*_exact(s))
-
-
-def _single(function: Callable[..., Any]) -> Callable[[State], Any]:
-    def call(s: State) -> Any:
-        X, u, parameters = _exact(s)
-        return function(X, u, parameters[0])
-
-    return call
-
-
-def _sheet(function: Callable[..., Any], law: Any) -> Callable[[State], Any]:
-    return lambda s: function(*_exact(s)[1:], law)
-
-
-def _contact(function: Callable[..., Any]) -> Callable[[State], Any]:
-    def call(s: State) -> Any:
-        X, u, parameters = _exact(s)
-        return function(X, u, numbers(s.data), parameters)
-
-    return call
-
-
-def _mixed(function: Callable[..., Any]) -> Callable[[State], Any]:
-    def call(s: State) -> Any:
-        X, u, parameters = _exact(s)
-        return function(X, u, numbers(s.data or s.point_data), parameters)
-
-    return call
-
-
-def _exact(s: State) -> tuple[Vector, Vector, Vector]:
-    return numbers(s.coordinates), numbers(s.dofs), numbers(s.parameters)
-
-
 SEGMENTS = ("film", "film_eyring", "film_carreau")
 OTHERS = {name: law for name, law in LAWS.items() if name != "mooney_rivlin"}
 
-RESIDUALS: dict[str, Oracle] = {
-    "solid_q4": _plain(solids.residual_q4),
-    "solid_fbar": _plain(solids.residual_fbar),
-    "solid_taylor": _plain(solids.residual_taylor),
-    "solid_taylor_mean": _plain(solids.residual_taylor_mean),
+
+def _of(energy: Callable[..., Number], **more: Any) -> Callable[[Arguments], Potential]:
+    return lambda a: partial(energy, a, **more)
+
+
+ENERGIES: dict[str, Callable[[Arguments], Potential]] = {
+    "solid_q4": solids.plain,
+    "solid_taylor": solids.taylor,
+    "solid_taylor_mean": solids.taylor_mean,
+    **{f"solid_taylor_mean_{n}": partial(solids.taylor_mean, law=law) for n, law in OTHERS.items()},
+    **{f"sheet_{n}": _of(sheet.energy, law=law) for n, law in LAWS.items()},
+    "contact_corner": _of(boundary.corner),
+    "mean_rotation": _of(section.rotation),
+    "mean_axial": _of(section.axial),
+    "axial_spring": _of(section.spring),
+}
+"""Families with a potential, by the arguments of an element: residual and tangent follow."""
+WEAK: dict[str, Callable[[Arguments, Vector], Vector]] = {
+    "solid_fbar": solids.fbar,
+    "follower_pressure": boundary.pressure,
+    "contact": boundary.contact,
+    "contact_friction": boundary.friction,
+    **dict.fromkeys(SEGMENTS, film.residual),
+    "film_upwind": upwind.residual,
+    "film_facet": facet.residual,
+    **mixed.RESIDUALS,
+    **mortar.RESIDUALS,
+    **touch.RESIDUALS,
+}
+"""Residuals of the others."""
+FIELDS: dict[str, Callable[[Arguments, Vector], Matrix]] = {
+    "solid_q4": solids.plain_fields,
+    "solid_fbar": solids.fbar_fields,
+    "solid_taylor": solids.taylor_fields,
+    "solid_taylor_mean": solids.taylor_mean_fields,
     **{
-        f"solid_taylor_mean_{n}": _plain(partial(solids.residual_taylor_mean, law=law))
+        f"solid_taylor_mean_{n}": partial(solids.taylor_mean_fields, law=law)
         for n, law in OTHERS.items()
     },
-    **{f"sheet_{n}": _sheet(sheet.residual, law) for n, law in LAWS.items()},
-    "follower_pressure": _single(boundary.residual_pressure),
-    "contact": _contact(boundary.residual_contact),
-    "contact_friction": _contact(boundary.residual_friction),
-    "contact_corner": _contact(boundary.residual_corner),
-    **{name: _film(film.residual_film) for name in SEGMENTS},
-    "film_upwind": _plain(upwind.residual_upwind),
-    "film_facet": _plain(facet.residual_facet),
-    "mean_rotation": _plain(section.residual_rotation),
-    "mean_axial": _plain(section.residual_axial),
-    "axial_spring": _single(section.residual_spring),
-    **{family: _mixed(residual) for family, residual in mixed.RESIDUALS.items()},
-    **{
-        family: _contact(residual)
-        for family, residual in {**mortar.RESIDUALS, **touch.RESIDUALS}.items()
-    },
+    **dict.fromkeys(SEGMENTS, film.fields),
+    "film_facet": facet.fields,
+    **mixed.FIELDS,
+    **mortar.FIELDS,
+    **touch.FIELDS,
 }
-TANGENTS: dict[str, Oracle] = {
-    "solid_q4": _plain(solids.tangent_q4),
-    "solid_fbar": _plain(solids.tangent_fbar),
-    "solid_taylor": _plain(solids.tangent_taylor),
-    "solid_taylor_mean": _plain(solids.tangent_taylor_mean),
-    **{
-        f"solid_taylor_mean_{n}": _plain(partial(solids.tangent_taylor_mean, law=law))
-        for n, law in OTHERS.items()
-    },
-    **{f"sheet_{n}": _sheet(sheet.tangent, law) for n, law in LAWS.items()},
-    "follower_pressure": _single(boundary.tangent_pressure),
-    "contact": _contact(boundary.tangent_contact),
-    "contact_friction": _contact(boundary.tangent_friction),
-    "contact_corner": _contact(boundary.tangent_corner),
-    **{name: _film(film.tangent_film) for name in SEGMENTS},
-    "film_upwind": _plain(upwind.tangent_upwind),
-    "film_facet": _plain(facet.tangent_facet),
-    "mean_rotation": _plain(section.tangent_rotation),
-    "mean_axial": _plain(section.tangent_axial),
-    "axial_spring": _single(section.tangent_spring),
-    **{family: _mixed(partial(mixed.tangent, family)) for family in mixed.RESIDUALS},
-    **{
-        family: _contact(tangent)
-        for family, tangent in {**mortar.TANGENTS, **touch.TANGENTS}.items()
-    },
-}
-ENERGIES: dict[str, Oracle] = {
-    "solid_q4": _plain(solids.energy_q4),
-    "solid_taylor": _plain(solids.energy_taylor),
-    "solid_taylor_mean": _plain(solids.energy_taylor_mean),
-    **{
-        f"solid_taylor_mean_{n}": _plain(partial(solids.energy_taylor_mean, law=law))
-        for n, law in OTHERS.items()
-    },
-    **{f"sheet_{n}": _sheet(sheet.energy, law) for n, law in LAWS.items()},
-    "contact_corner": _contact(boundary.energy_corner),
-    "mean_rotation": _plain(section.energy_rotation),
-    "mean_axial": _plain(section.energy_axial),
-    "axial_spring": _single(section.energy_spring),
-}
-FIELDS: dict[str, Oracle] = {
-    "solid_q4": _plain(solids.fields_q4),
-    "solid_fbar": _plain(solids.fields_fbar),
-    "solid_taylor": _plain(solids.fields_taylor),
-    "solid_taylor_mean": _plain(solids.fields_taylor_mean),
-    **{
-        f"solid_taylor_mean_{n}": _plain(partial(solids.fields_taylor_mean, law=law))
-        for n, law in OTHERS.items()
-    },
-    **{name: _film(film.fields_film) for name in SEGMENTS},
-    "film_facet": _plain(facet.fields_facet),
-    **{family: _mixed(fields) for family, fields in mixed.FIELDS.items()},
-    **{family: _contact(fields) for family, fields in {**mortar.FIELDS, **touch.FIELDS}.items()},
-}
+
+
+def exact(state: State) -> tuple[Arguments, Vector]:
+    """Arguments and unknowns of a state as exact numbers."""
+    data = numbers(state.data or state.point_data)
+    X, parameters = numbers(state.coordinates), numbers(state.parameters)
+    return Arguments(X, parameters, data, state.kind, state.count), numbers(state.dofs)
+
+
+def new_residual(state: State) -> Vector:
+    """Exact residual (ndof) of a state that occurs once."""
+    arguments, dofs = exact(state)
+    if state.family in WEAK:
+        return WEAK[state.family](arguments, dofs)
+    return gradient(ENERGIES[state.family](arguments), dofs)
 
 
 @lru_cache
 def residual(state: State) -> Vector:
     """Exact residual (ndof)."""
-    exact: Vector = RESIDUALS[state.family](state)
-    return exact
+    return new_residual(state)
 
 
 @lru_cache
 def tangent(state: State) -> Matrix:
-    """Exact tangent (ndof, ndof)."""
-    exact: Matrix = TANGENTS[state.family](state)
-    return exact
+    """Exact tangent (ndof, ndof); no state may sit on a switch."""
+    arguments, dofs = exact(state)
+    if state.family in WEAK:
+        return jacobian(partial(WEAK[state.family], arguments), dofs)
+    return hessian(ENERGIES[state.family](arguments), dofs)
 
 
-@lru_cache
 def energy(state: State) -> Number:
     """Exact potential, for the families in `ENERGIES`."""
-    return ENERGIES[state.family](state)
+    arguments, dofs = exact(state)
+    return ENERGIES[state.family](arguments)(dofs)
 
 
-@lru_cache
 def fields(state: State) -> Matrix:
     """Exact fields (points, fields), for the families in `FIELDS`."""
-    exact: Matrix = FIELDS[state.family](state)
-    return exact
+    arguments, dofs = exact(state)
+    return FIELDS[state.family](arguments, dofs)
 
 
 PAIRS = (*mixed.CONSERVING, "film_rough", "film_squeeze", "film_squeeze_rough")

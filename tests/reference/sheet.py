@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
-from tests.reference.differentiate import Matrix, Number, Vector, gradient, hessian, mp, mpf
-
-Law = Callable[..., Number]
+from tests.reference.differentiate import Arguments, Number, Vector, mp, mpf
 
 
-def energy(e: Sequence[Number], parameters: Sequence[Number], law: Law) -> Number:
-    """The isochoric term of a diagonal deformation gradient without change of volume."""
+def energy(a: Arguments, e: Vector, law: Callable[..., Number]) -> Number:
+    """The isochoric term of a diagonal deformation gradient without change of volume.
+
+    Its slopes are sigma_1 - sigma_3 and sigma_2 - sigma_3.
+    """
     zero = mpf(0)
     F = [mp.exp(e[0]), zero, zero, mp.exp(e[1]), mp.exp(-e[0] - e[1])]
-    return law(F, *parameters)
-
-
-def residual(e: Sequence[Number], parameters: Sequence[Number], law: Law) -> Vector:
-    """sigma_1 - sigma_3 and sigma_2 - sigma_3."""
-    return gradient(lambda v: energy(v, parameters, law), list(e))
-
-
-def tangent(e: Sequence[Number], parameters: Sequence[Number], law: Law) -> Matrix:
-    """Second differences of the energy."""
-    return hessian(lambda v: energy(v, parameters, law), list(e))
+    return law(F, *a.parameters)

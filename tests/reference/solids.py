@@ -1,8 +1,8 @@
 """Axisymmetric four-node solids: plain, F-bar and two Taylor-expanded, in (Z, R).
 
-Every function takes the 8 node coordinates (reference), the 8 displacements and the parameters
-(mu_1, mu_2, kappa), all exact numbers; energies in N mm, residuals in N. The one
-expanded about its means takes any isochoric `law`, whose parameters come before kappa.
+8 node coordinates (reference), 8 displacements and the parameters (mu_1, mu_2, kappa); energies in
+N mm, residuals in N. The one expanded about its means takes any isochoric `law`, whose parameters
+come before kappa.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from tests.reference import material
 from tests.reference.differentiate import (
     PI,
     STEP,
+    Arguments,
     Matrix,
     Number,
+    Potential,
     Vector,
-    hessian,
-    jacobian,
+    gradient,
     mp,
     mpf,
 )
-from tests.reference.differentiate import gradient as differences
 from tests.reference.rules import gauss
 
 CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
@@ -57,6 +57,10 @@ class Point:
             forces.append(P[2] * along_z + P[3] * along_r + P[4] * shape / self.radius)
         return forces
 
+    def mean(self, values: Sequence[Number], component: int) -> Number:
+        """A component of nodal values (two a node), interpolated."""
+        return mp.fsum(s * values[2 * a + component] for a, s in enumerate(self.shapes))
+
     @property
     def volume(self) -> Number:
         """2 pi R dA for unit weight, mm^3."""
@@ -86,25 +90,15 @@ def gauss_points(X: Coordinates) -> list[Point]:
     return [point(X, xi, eta) for xi, eta in gauss_places()]
 
 
-def energy_q4(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Number:
+def plain(a: Arguments) -> Potential:
     """Integral of (3) over the element."""
-    return _energy_q4(gauss_points(X), u, parameters)
+    points = gauss_points(a.X)
+    return lambda u: plain_energy(points, u, a.parameters)
 
 
-def _energy_q4(points: list[Point], u: Sequence[Number], parameters: Sequence[Number]) -> Number:
+def plain_energy(points: list[Point], u: Sequence[Number], parameters: Sequence[Number]) -> Number:
+    """The same with the geometry of its points."""
     return mp.fsum(at.volume * material.energy(at.deformation(u), *parameters) for at in points)
-
-
-def residual_q4(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Vector:
-    """Gradient of the energy."""
-    points = gauss_points(X)
-    return differences(lambda v: _energy_q4(points, v, parameters), u)
-
-
-def tangent_q4(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Matrix:
-    """Second differences of the energy."""
-    points = gauss_points(X)
-    return hessian(lambda v: _energy_q4(points, v, parameters), u)
 
 
 def modified_gradient(at: Point, centre: Point, u: Sequence[Number]) -> tuple[Vector, Number]:
@@ -114,21 +108,16 @@ def modified_gradient(at: Point, centre: Point, u: Sequence[Number]) -> tuple[Ve
     return [mp.cbrt(1 / ratio) * entry for entry in F], ratio
 
 
-def residual_fbar(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Vector:
+def fbar(a: Arguments, u: Vector) -> Vector:
     """Forces of P_eff = (J/J0)^(2/3) P(Fbar)."""
-    centre, total = point(X, mpf(0), mpf(0)), [mpf(0)] * 8
-    for at in gauss_points(X):
+    centre, total = point(a.X, mpf(0), mpf(0)), [mpf(0)] * 8
+    for at in gauss_points(a.X):
         Fbar, ratio = modified_gradient(at, centre, u)
         factor = mp.cbrt(ratio) ** 2
-        stress = [factor * entry for entry in material.first_piola(Fbar, *parameters)]
+        stress = [factor * entry for entry in material.first_piola(Fbar, *a.parameters)]
         forces = at.work(stress)
         total = [t + at.volume * f for t, f in zip(total, forces, strict=True)]
     return total
-
-
-def tangent_fbar(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Matrix:
-    """Differences of the residual."""
-    return jacobian(lambda v: residual_fbar(X, v, parameters), u)
 
 
 def taylor_points(X: Coordinates) -> tuple[list[Point], Point]:
@@ -154,31 +143,19 @@ def taylor_points(X: Coordinates) -> tuple[list[Point], Point]:
     return points, centre
 
 
-def energy_taylor(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Number:
+def taylor(a: Arguments) -> Potential:
     """Isochoric part at the expanded Gauss points, volumetric part at the centre only."""
-    return _energy_taylor(taylor_points(X), u, parameters)
+    points, centre = taylor_points(a.X)
+    mu_1, mu_2, kappa = a.parameters
 
+    def energy(u: Vector) -> Number:
+        shear = mp.fsum(
+            at.volume * material.isochoric(at.deformation(u), mu_1, mu_2) for at in points
+        )
+        I3 = material.third_invariant(centre.deformation(u))
+        return shear + 4 * centre.volume * material.volumetric(I3, kappa)
 
-def _energy_taylor(
-    geometry: tuple[list[Point], Point], u: Sequence[Number], parameters: Sequence[Number]
-) -> Number:
-    points, centre = geometry
-    mu_1, mu_2, kappa = parameters
-    shear = mp.fsum(at.volume * material.isochoric(at.deformation(u), mu_1, mu_2) for at in points)
-    I3 = material.third_invariant(centre.deformation(u))
-    return shear + 4 * centre.volume * material.volumetric(I3, kappa)
-
-
-def residual_taylor(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Vector:
-    """Gradient of the energy."""
-    geometry = taylor_points(X)
-    return differences(lambda v: _energy_taylor(geometry, v, parameters), u)
-
-
-def tangent_taylor(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Matrix:
-    """Second differences of the energy."""
-    geometry = taylor_points(X)
-    return hessian(lambda v: _energy_taylor(geometry, v, parameters), u)
+    return energy
 
 
 def mean_points(X: Coordinates) -> tuple[list[Point], Point]:
@@ -228,101 +205,61 @@ def differences_of(ahead: Vector, behind: Vector) -> Vector:
     return [(a - b) / (2 * STEP) for a, b in zip(ahead, behind, strict=True)]
 
 
-def energy_taylor_mean(
-    X: Coordinates,
-    u: Sequence[Number],
-    parameters: Sequence[Number],
-    law: Law = material.isochoric,
-) -> Number:
+def taylor_mean(a: Arguments, law: Law = material.isochoric) -> Potential:
     """Isochoric part at the Gauss points, volumetric part of the mean gradient."""
-    return _energy_mean(mean_points(X), u, parameters, law)
+    points, whole = mean_points(a.X)
+    *own, kappa = a.parameters
+
+    def energy(u: Vector) -> Number:
+        shear = mp.fsum(at.volume * law(at.deformation(u), *own) for at in points)
+        I3 = material.third_invariant(whole.deformation(u))
+        return shear + whole.volume * material.volumetric(I3, kappa)
+
+    return energy
 
 
-def _energy_mean(
-    geometry: tuple[list[Point], Point], u: Sequence[Number], parameters: Sequence[Number], law: Law
-) -> Number:
-    points, whole = geometry
-    *own, kappa = parameters
-    shear = mp.fsum(at.volume * law(at.deformation(u), *own) for at in points)
-    I3 = material.third_invariant(whole.deformation(u))
-    return shear + whole.volume * material.volumetric(I3, kappa)
-
-
-def residual_taylor_mean(
-    X: Coordinates, u: Vector, parameters: Sequence[Number], law: Law = material.isochoric
-) -> Vector:
-    """Gradient of the energy."""
-    geometry = mean_points(X)
-    return differences(lambda v: _energy_mean(geometry, v, parameters, law), u)
-
-
-def tangent_taylor_mean(
-    X: Coordinates, u: Vector, parameters: Sequence[Number], law: Law = material.isochoric
-) -> Matrix:
-    """Second differences of the energy."""
-    geometry = mean_points(X)
-    return hessian(lambda v: _energy_mean(geometry, v, parameters, law), u)
-
-
-def fields_q4(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
+def plain_fields(a: Arguments, u: Vector) -> Matrix:
     """z, r, J and the Cauchy stress zz, rr, tt, zr at the Gauss points of the plain element."""
-    return [_row(X, u, at, at.deformation(u), parameters) for at in gauss_points(X)]
+    return [_row(a, u, at, at.deformation(u)) for at in gauss_points(a.X)]
 
 
-def fields_fbar(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
+def fbar_fields(a: Arguments, u: Vector) -> Matrix:
     """The same of Fbar: J is that of the centroid, the stress is P_eff F^T / J."""
-    centre = point(X, mpf(0), mpf(0))
-    return [
-        _row(X, u, at, modified_gradient(at, centre, u)[0], parameters) for at in gauss_points(X)
-    ]
+    centre = point(a.X, mpf(0), mpf(0))
+    return [_row(a, u, at, modified_gradient(at, centre, u)[0]) for at in gauss_points(a.X)]
 
 
-def fields_taylor(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
+def taylor_fields(a: Arguments, u: Vector) -> Matrix:
     """J of the centre; Cauchy stress = isochoric Kirchhoff stress of the point / J + dW_v/dJ."""
-    return _fields_expanded(taylor_points(X), X, u, parameters)
+    return _expanded(taylor_points(a.X), a, u, material.isochoric)
 
 
-def fields_taylor_mean(
-    X: Coordinates,
-    u: Sequence[Number],
-    parameters: Sequence[Number],
-    law: Law = material.isochoric,
-) -> Matrix:
+def taylor_mean_fields(a: Arguments, u: Vector, law: Law = material.isochoric) -> Matrix:
     """The same with J of the mean gradient."""
-    return _fields_expanded(mean_points(X), X, u, parameters, law)
+    return _expanded(mean_points(a.X), a, u, law)
 
 
-def _fields_expanded(
-    geometry: tuple[list[Point], Point],
-    X: Coordinates,
-    u: Sequence[Number],
-    parameters: Sequence[Number],
-    law: Law = material.isochoric,
-) -> Matrix:
+def _expanded(geometry: tuple[list[Point], Point], a: Arguments, u: Vector, law: Law) -> Matrix:
     rows, (expanded, whole) = [], geometry
-    *own, kappa = parameters
+    *own, kappa = a.parameters
     J = material.determinant(whole.deformation(u))
-    mean = differences(lambda x: material.volumetric(x[0] ** 2, kappa), [J])[0]
-    for at, exact in zip(expanded, gauss_points(X), strict=True):
+    mean = gradient(lambda x: material.volumetric(x[0] ** 2, kappa), [J])[0]
+    for at, exact in zip(expanded, gauss_points(a.X), strict=True):
         zz, zr, rz, rr, tt = F = at.deformation(u)
-        P = differences(lambda G: law(G, *own), F)
+        P = gradient(lambda G: law(G, *own), F)
         stress = [
             (P[0] * zz + P[1] * zr) / J + mean,
             (P[2] * rz + P[3] * rr) / J + mean,
             P[4] * tt / J + mean,
             (P[0] * rz + P[1] * rr) / J,
         ]
-        rows.append([*_place(X, u, exact), J, *stress])
+        rows.append([*_place(a, u, exact), J, *stress])
     return rows
 
 
-def _row(
-    X: Coordinates, u: Sequence[Number], at: Point, F: Vector, parameters: Sequence[Number]
-) -> Vector:
-    return [*_place(X, u, at), material.determinant(F), *material.cauchy(F, *parameters)]
+def _row(a: Arguments, u: Vector, at: Point, F: Vector) -> Vector:
+    return [*_place(a, u, at), material.determinant(F), *material.cauchy(F, *a.parameters)]
 
 
-def _place(X: Coordinates, u: Sequence[Number], at: Point) -> Vector:
-    return [
-        mp.fsum(s * (X[2 * a + k] + u[2 * a + k]) for a, s in enumerate(at.shapes)) for k in (0, 1)
-    ]
+def _place(a: Arguments, u: Vector, at: Point) -> Vector:
+    return [at.mean(a.X, k) + at.mean(u, k) for k in (0, 1)]

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from tests.reference.differentiate import Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.differentiate import Arguments, Matrix, Number, Vector, mp, mpf
 from tests.reference.rules import gauss
 
 Points = list[Vector]
 
 
-def residual_point(_: object, dofs: Sequence[Number], data: Sequence[Number], __: object) -> Vector:
+def residual_point(arguments: Arguments, dofs: Vector) -> Vector:
     """Stress on the partner, then what lambda and tau are made of, over rho."""
-    rho, friction, depth, reach = data
+    rho, friction, depth, reach = arguments.data
     apart, a, b, came = (list(dofs[3 * k : 3 * k + 3]) for k in range(4))
     across = _cross(a, b)
     n = [v / _length(across) for v in across]
@@ -35,16 +35,9 @@ def residual_point(_: object, dofs: Sequence[Number], data: Sequence[Number], __
     return found
 
 
-def tangent_point(_: object, dofs: Vector, data: Sequence[Number], __: object) -> Matrix:
-    """Differences of the residual."""
-    return jacobian(lambda v: residual_point(_, v, data, __), dofs)
-
-
-def residual_side(
-    nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
-) -> Vector:
+def residual_side(nodes: int, arguments: Arguments, dofs: Vector) -> Vector:
     """Minus the integrals of lambda and tau over rho, with each shape function."""
-    (rho,) = data
+    X, (rho,) = arguments.X, arguments.data
     rest = _places(X, [mpf(0)] * len(X), range(nodes))
     found, multipliers = [mpf(0)] * len(dofs), dofs[3 * nodes :]
     for at, weight in _rule(nodes):
@@ -56,17 +49,9 @@ def residual_side(
     return found
 
 
-def tangent_side(
-    nodes: int, X: Sequence[Number], dofs: Vector, data: Sequence[Number], _: object
-) -> Matrix:
-    """Differences of the residual."""
-    return jacobian(lambda v: residual_side(nodes, X, v, data, _), dofs)
-
-
-def fields_side(
-    nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
-) -> Matrix:
+def fields_side(nodes: int, arguments: Arguments, dofs: Vector) -> Matrix:
     """True pressure and shear stress, place, and area of each point."""
+    X = arguments.X
     rest, moved = (_places(X, u, range(nodes)) for u in ([mpf(0)] * len(X), dofs))
     rows, multipliers = [], dofs[3 * nodes :]
     for at, weight in _rule(nodes):
@@ -83,12 +68,8 @@ def fields_side(
 
 SIDES = {f"touch_side_{a}": a for a in (3, 4, 6, 8, 9)}
 RESIDUALS = {
-    "touch": partial(residual_point),
+    "touch": residual_point,
     **{name: partial(residual_side, a) for name, a in SIDES.items()},
-}
-TANGENTS = {
-    "touch": partial(tangent_point),
-    **{name: partial(tangent_side, a) for name, a in SIDES.items()},
 }
 FIELDS = {name: partial(fields_side, a) for name, a in SIDES.items()}
 

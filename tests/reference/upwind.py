@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.differentiate import PI, Arguments, Number, Vector, mp, mpf
 from tests.reference.rules import gauss, lagrange, lobatto
 
 
@@ -39,16 +39,9 @@ def share(X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Numb
     return weight * peclet**2 / (9 + peclet**2)
 
 
-def residual_upwind(
-    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number]
-) -> Vector:
+def residual(a: Arguments, dofs: Vector) -> Vector:
     """Radial forces (N) that are taken from node 1 and given to node 2."""
-    strength, force_weight = parameters[4:]
-    factor = force_weight * strength * share(X, dofs, parameters) / 2
-    moved = factor * bubble_load(X, dofs, dofs[4:])
+    strength, force_weight = a.parameters[4:]
+    factor = force_weight * strength * share(a.X, dofs, a.parameters) / 2
+    moved = factor * bubble_load(a.X, dofs, dofs[4:])
     return [mpf(0), -moved, mpf(0), moved] + [mpf(0)] * (len(dofs) - 4)
-
-
-def tangent_upwind(X: Sequence[Number], dofs: Vector, parameters: Sequence[Number]) -> Matrix:
-    """Differences of the residual."""
-    return jacobian(lambda v: residual_upwind(X, v, parameters), dofs)
