@@ -39,7 +39,7 @@ from softehl.runtime.kernels.shared_library import library_of
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.solution import Status
 from tests.cases.oring_cases import film_values
-from tests.cases.test_refused import REFUSED
+from tests.cases.test_parameters import REFUSED
 
 HEADER = (
     "sealed_pressure_MPa,rod_speed_mm_s,h_star_um,h_star_error_percent,h_min_um,p_max_MPa,"

@@ -1,15 +1,17 @@
-"""Standard glands: values of charts, rules between them, keys of depth and fill, tolerances."""
+"""Grooves and rings by their names and standards, and what is assumed of them."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import pi
 from typing import Any
 
 import pytest
 
+from softehl.cases.harness.case_file import read_case
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland import catalogue
-from softehl.cases.seal.gland.catalogue import as568
+from softehl.cases.seal.gland.catalogue import as568, ring
 from softehl.cases.seal.gland.grooves import (
     INCH,
     KINDS,
@@ -21,6 +23,11 @@ from softehl.cases.seal.gland.messages import handbook
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import Gland
 from softehl.cases.seal.gland.tolerances import read_tolerances
+from softehl.cases.seal.gland.trade.normalise_text import NotUnderstoodError
+from softehl.cases.shipped import SHIPPED
+
+# --- Standard glands: values of charts, rules between them, keys of depth and fill, tolerances ----
+
 
 METRIC = {
     1.8: (1.45, 2.4),
@@ -156,3 +163,231 @@ def test_tolerances_of_depth_squeeze_and_fill_are_those_of_diameter_and_width() 
     assert sizes == pytest.approx([2 * 0.04 / 43.0, 2 * 0.02 * 4.0 / 43.0, 0.1])
     shares = read_tolerances(Seal(sensitivity=True, tolerances=("groove_depth 2 %",)))
     assert shares["groove_depth"] == {"housing_diameter": pytest.approx(0.02 * 6.3 / 56.3)}
+
+
+# --- The catalogue of rings and glands, against published dimensions and its own order ------------
+
+
+SERIES = {0: (1, 50), 1: (102, 178), 2: (201, 284), 3: (309, 395), 4: (425, 475)}
+# inside diameter and tolerance, inch, as makers' charts print them
+PRINTED = {
+    1: (0.029, 0.004),
+    12: (0.364, 0.005),
+    50: (5.239, 0.037),
+    113: (0.549, 0.007),
+    152: (3.237, 0.024),
+    178: (9.737, 0.055),
+    201: (0.171, 0.005),
+    210: (0.734, 0.010),
+    222: (1.484, 0.015),
+    226: (1.984, 0.018),
+    230: (2.484, 0.020),
+    259: (6.234, 0.040),
+    284: (17.955, 0.085),
+    325: (1.475, 0.015),
+    395: (25.940, 0.120),
+    425: (4.475, 0.033),
+    451: (10.975, 0.060),
+    475: (25.940, 0.120),
+}
+
+
+def test_all_general_sizes_are_there() -> None:
+    numbers = [n for first, last in SERIES.values() for n in range(first, last + 1)]
+    assert list(as568()) == numbers
+    assert len(numbers) == 349
+
+
+@pytest.mark.parametrize(("number", "printed"), PRINTED.items())
+def test_printed_sizes(number: int, printed: tuple[float, float]) -> None:
+    found = as568()[number]
+    assert found.inner_diameter == pytest.approx(printed[0] * INCH, abs=1e-4)
+    assert found.inner_tolerance == pytest.approx(printed[1] * INCH, abs=1e-4)
+
+
+@pytest.mark.parametrize("series", SERIES)
+def test_sizes_and_tolerances_rise_in_a_series(series: int) -> None:
+    first, last = SERIES[series]
+    rings = [as568()[n] for n in range(first, last + 1)]
+    for a, b in pairwise(rings):
+        assert b.inner_diameter > a.inner_diameter
+        assert a.inner_tolerance is not None
+        assert b.inner_tolerance is not None
+        assert b.inner_tolerance >= a.inner_tolerance
+
+
+@pytest.mark.parametrize("name", ["AS568-226", "as568-226", "-226", "226", "AS 568A-226", "2-226"])
+def test_names_of_one_ring(name: str) -> None:
+    found = ring(name)
+    assert found.name == "AS568-226"
+    assert (found.inner_diameter, found.section_diameter) == pytest.approx((50.3936, 3.5306))
+
+
+@pytest.mark.parametrize(
+    "name", ["ISO 3601 50.4x3.55", "ISO 3601-1 50,4 x 3,55", "50.4x3.55", "50.4 mm x 3.55 mm"]
+)
+def test_metric_rings(name: str) -> None:
+    found = ring(name)
+    assert found.name == "ISO 3601 50.4x3.55"
+    assert (found.inner_diameter, found.section_diameter) == (50.4, 3.55)
+    assert (found.inner_tolerance, found.section_tolerance) == (0.48, 0.10)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("AS568-100", 'no general size -100; nearest: "AS568-050" and "AS568-102"'),
+        ("-999", 'nearest: "AS568-475"'),
+        ("000", 'nearest: "AS568-001"'),
+        ("quad ring", 'write "36x4", "ISO 3601 50.4x3.55" or "AS568-226"'),
+        ("U-cup 25x35x8", "is a U-cup, which is named by its groove"),
+        ("ISO 3601 3.55x50.4", "write inside diameter x section in mm"),
+    ],
+)
+def test_unknown_rings_name_the_nearest(name: str, says: str) -> None:
+    with pytest.raises(NotUnderstoodError) as caught:
+        ring(name)
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def seated(inner: float, section: float, rod: float, housing: float, width: float) -> Gland:
+    return Gland(
+        inner_diameter=inner,
+        section_diameter=section,
+        rod_diameter=rod,
+        housing_diameter=housing,
+        groove_width=width,
+    )
+
+
+def test_stretch() -> None:
+    assert seated(50.0, 4.0, 51.0, 58.0, 5.0).stretch_percent == pytest.approx(2.0)
+    assert seated(50.39, 4.0, 50.0, 57.0, 5.0).stretch_percent == 0.0
+
+
+def test_a_ring_is_stretched_on_the_ground_of_a_piston() -> None:
+    p = seated(-40.0, 4.0, -40.0, -33.0, 5.2)  # an inside diameter of 32 mm
+    assert p.stretch_percent == pytest.approx(100.0 / 32.0)
+    assert p.fill_percent == pytest.approx(68.1, abs=0.1)
+
+
+def test_squeeze() -> None:
+    assert squeeze(3.53, 3.15) == pytest.approx(10.765, abs=1e-3)
+
+
+def test_warnings_of_handbooks() -> None:
+    ring_226 = 50.3936, 3.5306
+    assert not [*handbook(seated(*ring_226, 50.0, 56.15, 4.7))]
+    (over,) = handbook(seated(*ring_226, 50.0, 56.15, 3.3))
+    assert over == "the ring fills 98 % of its gland; handbooks advise 60 to 95 %"
+    (wide,) = handbook(seated(*ring_226, 50.0, 56.15, 9.0))
+    assert wide.startswith("the ring fills 36 %")
+    (tight,) = handbook(seated(*ring_226, 53.5, 59.65, 4.7))
+    assert "stretched by 6.2 % on its rod" in tight
+
+
+# --- A ring, a rod and a gland by name, and the measures that follow ------------------------------
+
+
+def test_a_ring_on_a_rod_comes_with_its_standard_gland() -> None:
+    p = Seal(ring="AS568-210", rod=19.0)
+    assert (p.inner_diameter, p.section_diameter) == pytest.approx((18.6436, 3.5306))
+    assert p.rod_diameter == 19.0
+    assert p.housing_diameter == pytest.approx(19.0 + 2 * 0.121 * 25.4, abs=1e-3)
+    assert p.groove_width == pytest.approx(0.185 * 25.4, abs=1e-3)
+    assert p.gland == "dynamic"
+
+
+def test_a_squeeze_decides_the_housing() -> None:
+    p = Seal(ring="AS568-210", rod=19.0, squeeze=12.0)
+    assert p.housing_diameter == pytest.approx(19.0 + 2 * 0.88 * 3.5306)
+    assert p.groove_width == pytest.approx(0.185 * 25.4, abs=1e-3)
+    other = Seal(
+        section_diameter=5.0, inner_diameter=100.0, rod=101.0, squeeze=20.0, groove_width=7
+    )
+    assert other.housing_diameter == pytest.approx(109.0)
+
+
+def test_what_is_used_can_be_given_again() -> None:
+    """As a resumed run does, and a run of run.json's parameters."""
+    p = Seal(ring="ISO 3601 50.4x3.55", rod=51, squeeze=10)
+    assert Seal(**p.model_dump()) == p
+
+
+# --- What a run says that it assumed: what matters and was not given ------------------------------
+
+
+RING = ("ring=AS568-210", "rod=19")
+
+
+def assumptions(*assignments: str, case: str = "oring") -> list[str]:
+    run = read_case(case, SHIPPED, assignments)
+    return run.case.assumed(run.parameters, run.set_keys)
+
+
+def test_of_nothing_given_everything_is_said() -> None:
+    words = ["section of 3.53", "inner diameter 50.39", "rubber", "rod of 50", "gland", "back-up"]
+    said = assumptions()
+    assert len(said) == len(words) + 2
+    for word, phrase in zip([*words, "pressure of 1 MPa", "65.9 mPa s"], said, strict=True):
+        assert word in phrase
+    assert assumptions(case="cycle") == said
+
+
+def test_a_ring_stands_in_its_standard_gland() -> None:
+    (gland,) = (words for words in assumptions(*RING) if "gland" in words)
+    assert gland == "its standard gland (housing_diameter = 25.1468 mm, groove_width = 4.699 mm)"
+
+
+@pytest.mark.parametrize(
+    ("given", "gone"),
+    [
+        ("gland=dynamic", "gland"),
+        ("squeeze=15", "housing_diameter"),
+        ("groove_width=5", "groove_width"),
+        ("shore_A=70", "rubber"),
+        ("mu_1=2", "rubber"),
+        ("backup=true", "back-up"),
+        ("extrusion_gap=0.1", "back-up"),
+        ("sealed_pressure=2", "pressure"),
+        ("viscosity=1e-8", "oil"),
+        ('oil="46 cSt at 40 degC, 6.8 cSt at 100 degC"', "an oil of"),
+    ],
+)
+def test_what_is_given_is_not_assumed(given: str, gone: str) -> None:
+    more = ("temperature=40",) if given.startswith("oil") else ()
+    assert gone in str(assumptions(*RING))
+    assert gone not in str(assumptions(*RING, given, *more))
+
+
+WATER_GLYCOL = ("oil=46 cSt at 40 degC, 12 cSt at 100 degC", "temperature=40")
+
+
+def test_what_is_taken_from_a_mineral_oil_is_said() -> None:
+    both = "the density 870 kg/m3 at 15 degC and the pressure-viscosity coefficient 0.0214 1/MPa"
+    assert f"{both}, of a mineral oil" in assumptions(*RING, *WATER_GLYCOL)
+    one = str(assumptions(*RING, *WATER_GLYCOL, "oil_density=1080"))
+    assert "the pressure-viscosity coefficient" in one
+    assert "density 870" not in one
+    known = assumptions(*RING, *WATER_GLYCOL, "oil_density=1080", "pressure_viscosity=0.003")
+    assert "mineral" not in str(known)
+    assert "mineral" not in str(assumptions(*RING, "oil=HLP 46", "temperature=40"))
+    assert "a pressure-viscosity coefficient of 0.02 1/MPa" in assumptions(*RING, "viscosity=1e-8")
+
+
+def warned(*assignments: str) -> str:
+    run = read_case("oring", SHIPPED, assignments)
+    return " ".join(run.case.warnings(run.parameters))
+
+
+def test_rubber_and_oil_in_the_cold_are_not_what_they_are_taken_for() -> None:
+    cold = warned("material=NBR 70", "oil=HLP 32", "temperature=-35")
+    assert "rubber is stiffer in the cold, the more the nearer to -50 degC" in cold
+    assert "the pour point of HLP 32 may be as high as -18 degC (DIN 51524)" in cold
+    said = "its modulus at room temperature, not at -35 degC"
+    assert said in assumptions("material=NBR 70", "oil=HLP 32", "temperature=-35")
+    assert "pour point" not in warned("oil=HVLP 32", "temperature=-25")
+    assert "may be as high as -30 degC" in warned("oil=HVLP 32", "temperature=-35")
+    assert "below both viscosities" in warned(WATER_GLYCOL[0], "temperature=-10")
+    assert not warned("material=NBR 70", "oil=HLP 32", "temperature=20")

@@ -1,16 +1,40 @@
-"""What seal engineers type: understood, or answered with what to write."""
+"""Names of the trade: rings, rubbers, rods, finishes and oils."""
 
 from __future__ import annotations
+
+import json
+import re
+from math import exp, log, log10, sqrt
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.oring import CASE
-from softehl.cases.seal.gland.oils import at_100_of_index, density, viscosity_index
+from softehl.cases.seal.gland.oils import (
+    Walther,
+    at_100_of_index,
+    barus,
+    barus_of_roelands,
+    density,
+    read_oil,
+    viscosity_index,
+)
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.tolerances import read_tolerances
+from softehl.cases.seal.gland.trade.finish_names import read_finish
+from softehl.cases.seal.gland.trade.fit_names import DEVIATIONS, GRADES, STEPS, band, read_fit
+from softehl.cases.seal.gland.trade.normalise_text import NotUnderstoodError
+from softehl.cases.seal.gland.trade.oil_names import GRADES as OIL_GRADES
+from softehl.cases.seal.gland.trade.oil_names import dynamic, read_oil_name
+from softehl.cases.seal.gland.trade.ring_names import RingName, read_ring
+from softehl.cases.seal.gland.trade.rubber_names import RubberName, read_rubber
 from softehl.cases.shipped import SHIPPED
+
+# --- What seal engineers type: understood, or answered with what to write -------------------------
+
 
 GLAND = ("rod=36", "squeeze=15", "groove_width=5.4")
 
@@ -147,3 +171,219 @@ def test_names_of_rings_with_a_leading_zero_and_of_quad_rings() -> None:
     assert typed("ring=Q4-210", "rod=19") == typed("ring=X-ring 210", "rod=19").model_copy(
         update={"ring": "Q4-210"}
     )
+
+
+# --- Two hundred spellings of rings, fits, oils, rubbers and finishes: read right, or refused -----
+
+
+DATA: dict[str, Any] = json.loads(
+    Path(__file__).with_name("trade_names.json").read_text(encoding="utf-8")
+)
+
+
+def test_two_hundred_spellings() -> None:
+    assert sum(map(len, DATA.values())) >= 200
+
+
+@pytest.mark.parametrize("name", DATA["rings"])
+def test_metric_rings(name: str) -> None:
+    found = read_ring(name)
+    assert [found.inner, found.section, found.kind] == DATA["rings"][name]
+
+
+def test_rings_by_number() -> None:
+    for name, kind in DATA["dash"].items():
+        assert read_ring(name) == RingName(number=210, kind=kind), name
+
+
+def test_u_cups_by_their_groove() -> None:
+    for name in DATA["cups"]:
+        found = RingName(inner=25.0, kind="u_cup", outer=35.0, width=8.0)
+        assert read_ring(name) == found, name
+
+
+def test_shafts_and_holes_with_limits() -> None:
+    for names, hole in ((DATA["fits"], False), (DATA["holes"], True)):
+        for name, (low, high) in names.items():
+            found = read_fit("rod", name, hole=hole)
+            assert found is not None, name
+            assert (found.low, found.high) == pytest.approx((low, high), abs=1e-9), name
+            assert found.middle == pytest.approx(0.5 * (low + high))
+            assert found.half == pytest.approx(0.5 * (high - low))
+
+
+def test_a_size_without_limits_is_left_to_units() -> None:
+    assert [read_fit("rod", text) for text in DATA["plain"]] == [None] * len(DATA["plain"])
+
+
+def test_oils() -> None:
+    for name, (grade, index) in DATA["oils"].items():
+        found = read_oil_name(name)
+        assert (found.grade, found.index, found.temperature) == (grade, index, None), name
+    for name in DATA["warm"]:
+        assert (read_oil_name(name).grade, read_oil_name(name).temperature) == (46, 50.0), name
+    for name in DATA["points"]:
+        assert read_oil_name(name).points == ((46.0, 40.0), (6.8, 100.0)), name
+    for name in DATA["viscosities"]:
+        assert dynamic(name) == pytest.approx(1e-7), name
+
+
+def test_rubbers() -> None:
+    for name, (polymer, shore) in DATA["rubbers"].items():
+        assert read_rubber("material", name) == RubberName(polymer, shore), name
+    assert [read_rubber("material", name) for name in DATA["no_names"]] == [None] * len(
+        DATA["no_names"]
+    )
+
+
+def test_finishes() -> None:
+    for name, height in DATA["finishes"].items():
+        assert read_finish(name) == pytest.approx(height, rel=1e-5), name
+    assert read_finish("0.25 um") is None
+
+
+def test_what_is_not_understood_is_answered_with_what_is() -> None:
+    readers = (
+        (DATA["no_rings"], read_ring),
+        (DATA["no_fits"], lambda text: read_fit("rod", text)),
+        (DATA["no_oils"], read_oil_name),
+        (DATA["no_rubbers"], lambda text: read_rubber("material", text)),
+        (DATA["no_finishes"], read_finish),
+    )
+    for names, read in readers:
+        for name, says in names.items():
+            with pytest.raises(NotUnderstoodError) as caught:
+                read(name)
+            assert says in str(caught.value), name
+            assert "\n" not in str(caught.value)
+
+
+def _read_finishes(text: str) -> list[float | None]:
+    return [read_finish(part) for part in text.split(" and ")]
+
+
+@pytest.mark.parametrize(
+    ("names", "read"),
+    [
+        (DATA["no_rings"], read_ring),
+        (DATA["no_oils"], read_oil_name),
+        (DATA["no_finishes"], _read_finishes),
+    ],
+)
+def test_the_forms_of_a_refusal_are_read(names: dict[str, str], read: object) -> None:
+    assert callable(read)
+    for name in names:
+        with pytest.raises(NotUnderstoodError) as caught:
+            read(name)
+        forms = str(caught.value).rpartition("; write ")[2]
+        for form in re.findall(r'"([^"]+)"', forms):
+            read(form)
+
+
+def test_the_tables_follow_the_formulas_of_iso_286() -> None:
+    """i = 0.45 D^(1/3) + 0.001 D and deviations as powers of D, before the standard's rounding."""
+    times = {5: 7, 6: 10, 7: 16, 8: 25, 9: 40, 10: 64, 11: 100, 12: 160}
+    powers = {"d": (16.0, 0.44), "e": (11.0, 0.41), "f": (5.5, 0.41), "g": (2.5, 0.34)}
+    for step in range(1, len(STEPS)):  # the standard rounds up to 3 mm
+        D = sqrt(STEPS[step - 1] * STEPS[step])
+        unit = 0.45 * D ** (1 / 3) + 0.001 * D
+        for grade, factor in times.items():
+            assert GRADES[grade][step] == pytest.approx(factor * unit, rel=0.05, abs=1.5), (
+                grade,
+                D,
+            )
+        for letter, (most, power) in powers.items():
+            assert DEVIATIONS[letter][step] == pytest.approx(most * D**power, rel=0.03, abs=1.0)
+
+
+def test_published_limits() -> None:
+    """Of common fits in handbooks, um."""
+    for (size, letter, grade), (low, high) in {
+        (10.0, "f", 7): (-28, -13),
+        (25.0, "g", 6): (-20, -7),
+        (50.0, "h", 6): (-16, 0),
+        (80.0, "e", 8): (-106, -60),
+        (100.0, "f", 7): (-71, -36),
+        (200.0, "d", 9): (-285, -170),
+        (63.0, "H", 8): (0, 46),
+        (100.0, "H", 7): (0, 35),
+        (320.0, "H", 9): (0, 140),
+        (50.0, "E", 8): (50, 89),
+    }.items():
+        found = band(size, letter, grade)
+        assert (found.low - size, found.high - size) == pytest.approx((1e-3 * low, 1e-3 * high))
+
+
+# --- Oils by grade or two viscosities: Walther's line, density, pressure; what is refused ---------
+
+
+VG46 = (
+    "ISO VG 46",
+    "vg46",
+    "46 cSt at 40 degC, 6.8 cSt at 100 degC",
+    "6.8cSt @ 100 C, 46cSt @ 40C",
+)
+
+
+@pytest.mark.parametrize("text", VG46)
+def test_walthers_line_of_vg_46(text: str) -> None:
+    """Numbers of the issue, to 0.01 %."""
+    law = read_oil(text)
+    assert pytest.approx(9.41799, rel=1e-4) == law.A
+    assert pytest.approx(3.68444, rel=1e-4) == law.B
+    assert law(20.0) == pytest.approx(133.84, rel=1e-4)
+    assert law(60.0) == pytest.approx(20.623, rel=1e-4)
+    assert law(40.0) == pytest.approx(46.0, rel=1e-12)
+    assert law(61.0) != pytest.approx(20.623, rel=1e-2)
+
+
+def test_grades_are_of_one_family() -> None:
+    """Viscosity at 100 degC over that at 40 falls steadily, and the slope B with it."""
+    slopes = [read_oil(f"ISO VG {grade}").B for grade in OIL_GRADES]
+    assert all(3.3 < b < 4.2 for b in slopes)
+    ratios = [hot / grade for grade, hot in OIL_GRADES.items()]
+    assert ratios == sorted(ratios, reverse=True)
+
+
+def test_a_case_takes_the_dynamic_viscosity() -> None:
+    p = Seal(oil="ISO VG 46", temperature=60.0)
+    rho = 870.0 - 0.65 * 45.0
+    assert density(60.0) == pytest.approx(rho)
+    assert p.viscosity == pytest.approx(20.623 * rho * 1e-12, rel=1e-4)
+    assert p.pressure_viscosity == pytest.approx(1e-2 * (0.6 + 0.965 * log10(17.338)), rel=1e-3)
+    heavy = Seal(oil="ISO VG 46", temperature=60.0, oil_density=900.0)
+    assert heavy.viscosity / p.viscosity == pytest.approx((rho + 30.0) / rho)
+    own = Seal(oil="ISO VG 46", temperature=60.0, pressure_viscosity=0.015)
+    assert own.pressure_viscosity == 0.015
+    assert Seal(**p.model_dump()) == p
+
+
+def test_without_an_oil_table_1_holds() -> None:
+    p = Seal()
+    assert (p.viscosity, p.pressure_viscosity, p.temperature) == (6.59e-8, 0.02, None)
+
+
+def test_roelands_at_the_pressures_of_seals() -> None:
+    """His exponent against Barus with the same start: 0.2 % at 10 MPa, 2 % at 30 MPa."""
+    eta, z = 40e-9, 0.6
+    alpha = barus_of_roelands(eta, z)
+
+    def ratio(p: float) -> float:
+        roelands = (log(eta * 1e6) + 9.67) * ((1.0 + p / 196.2) ** z - 1.0)
+        return exp(roelands - alpha * p)
+
+    assert alpha == pytest.approx(0.0197, rel=0.01)
+    assert 0.995 < ratio(10.0) < 0.9985
+    assert 0.97 < ratio(30.0) < 0.99
+    p = Seal(oil="ISO VG 46", temperature=40.0, roelands=z)
+    assert p.pressure_viscosity == pytest.approx(barus_of_roelands(p.viscosity, z))
+    assert Seal(**p.model_dump()) == p
+
+
+def test_wooster() -> None:
+    assert barus(40e-9) == pytest.approx(0.02146, rel=1e-3)
+
+
+def test_a_line_needs_two_temperatures() -> None:
+    with pytest.raises(ValueError, match="two temperatures"):
+        Walther.through((46.0, 40.0), (6.8, 40.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from tests.reference.differentiate import Arguments, Matrix, Number, Vector, mp, mpf
@@ -67,7 +67,7 @@ def fields_side(nodes: int, arguments: Arguments, dofs: Vector) -> Matrix:
 
 
 SIDES = {f"touch_side_{a}": a for a in (3, 4, 6, 8, 9)}
-RESIDUALS = {
+RESIDUALS: dict[str, Callable[[Arguments, Vector], Vector]] = {
     "touch": residual_point,
     **{name: partial(residual_side, a) for name, a in SIDES.items()},
 }

@@ -1,7 +1,4 @@
-"""Modified Newton on a Schur complement: an elastic chain with an exponential layer.
-
-The problem is built around a solution that is chosen, so that the answer is known exactly.
-"""
+"""Correctors of films: modified Newton on a Schur complement, dissection, lagged pressure."""
 
 from __future__ import annotations
 
@@ -13,10 +10,16 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
-from softehl.cases.seal.correctors.chord_newton import ModifiedNewton
+from softehl.cases.seal.correctors.chord_newton import ModifiedNewton, solved
 from softehl.cases.seal.correctors.layer_split import Cut, Parts
+from softehl.cases.seal.correctors.nested_dissection import Elimination
+from softehl.cases.seal.correctors.perturbed_lagrangian import LaggedPressure, element_pressures
 from softehl.cases.seal.correctors.schur_corrector import SchurCorrector, StaleTangent
+from softehl.cases.seal.equations.system import SealSystem, build_system
+from softehl.cases.seal.solve.contact_stages import contact_problem
 from softehl.runtime.arrays import Array
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.linear import pardiso
 from softehl.runtime.solve.linear.linear_solver import Condenser, SingularMatrix
@@ -24,6 +27,10 @@ from softehl.runtime.solve.linear.pardiso import Pardiso
 from softehl.runtime.solve.linear.superlu import SuperLU
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Status
+from tests.cases.oring_cases import oring
+
+# --- Modified Newton on a Schur complement: an elastic chain with an exponential layer ------------
+
 
 N, M, K = 30, 4, 5
 SHARED, OWN = np.arange(10, 10 + M), np.arange(N - K, N)
@@ -331,3 +338,163 @@ def test_entries_are_added_where_the_tangent_has_some() -> None:
     assert (replace(parts, data=parts.data + more).matrix.toarray() == A).all()
     with pytest.raises(ValueError, match="no entry in row 4, column 0"):
         parts.cut.placed(rows + 3, columns - 1, np.ones(3))
+
+
+# --- Chains that are eliminated piece by piece: as a dense solve, and left whole where that -------
+
+
+SEGMENTS, OF_LAYER = 23, 26
+
+
+def chain(order: int, fields: int, *, ends: bool, seed: int = 1) -> np.ndarray:
+    """A matrix of elements along a chain, of so many nodes each, with or without its ends.
+
+    Each element knows two of the first unknowns, which it shares with others.
+    """
+    rng, n = np.random.default_rng(seed), (SEGMENTS * order + 1) * fields
+    A = np.zeros((OF_LAYER + n, OF_LAYER + n))
+    for element in range(SEGMENTS):
+        first = OF_LAYER + element * order * fields
+        part = np.append([element, element + 3], first + np.arange((order + 1) * fields))
+        A[np.ix_(part, part)] += rng.normal(size=(len(part),) * 2) + 4.0 * np.eye(len(part))
+    if ends:
+        return A
+    inside = np.r_[:OF_LAYER, OF_LAYER + fields : OF_LAYER + n - fields]
+    return np.asarray(A[np.ix_(inside, inside)])
+
+
+def band(width: int, n: int = 80) -> np.ndarray:
+    return sum(np.eye(n, k=k) for k in range(-width, width + 1)) + 3.0 * np.eye(n)
+
+
+def elimination(A: np.ndarray, m: int) -> Elimination:
+    K = csc_array(A)
+    return Cut.of(K.indptr, K.indices, m, len(A)).elimination
+
+
+def check(A: np.ndarray, m: int) -> None:
+    rng = np.random.default_rng(2)
+    S, r = rng.normal(size=(m, m)), rng.normal(size=len(A))
+    whole = A.copy()
+    whole[:m, :m] += S
+    found = solved(S, Parts.of(csc_array(A), m), r)
+    assert found == pytest.approx(np.linalg.solve(whole, r), rel=1e-9, abs=1e-11)
+
+
+@pytest.mark.parametrize("ends", [True, False])
+@pytest.mark.parametrize(("order", "fields"), [(2, 2), (2, 1), (4, 1), (4, 2), (8, 1)])
+def test_pieces_are_solved_like_the_whole(order: int, fields: int, ends: bool) -> None:
+    A = chain(order, fields, ends=ends)
+    check(A, OF_LAYER)
+    assert len(elimination(A, OF_LAYER).remaining) < 0.5 * (len(A) - OF_LAYER) + OF_LAYER
+
+
+@pytest.mark.parametrize("width", [0, 1, 2, 5, 79])
+def test_a_band_of_any_width_is_solved(width: int) -> None:
+    check(band(width), 0)
+
+
+def test_pieces_end_where_few_unknowns_are_between_them() -> None:
+    first, *_ = elimination(chain(4, 2, ends=False), OF_LAYER).levels
+    assert first.inner.shape == (SEGMENTS, 6)
+    assert first.boundary.shape == (SEGMENTS, 2 + 4)
+
+
+def test_a_singular_piece_is_left_to_the_whole() -> None:
+    A = chain(4, 1, ends=True)
+    piece = elimination(A, OF_LAYER).levels[0].inner[1]
+    piece = piece[piece < len(A)]
+    A[np.ix_(piece, piece)] = 1.0  # no entry is left out, and each of its pivots is exact
+    check(A, OF_LAYER)
+
+
+@pytest.mark.parametrize("row", [3, OF_LAYER + 12])
+def test_a_singular_whole_is_refused(row: int) -> None:
+    A = chain(4, 1, ends=True)
+    A[row] = 0.0
+    with pytest.raises(SingularMatrix):
+        solved(
+            np.zeros((OF_LAYER, OF_LAYER)),
+            Parts.of(csc_array(A), OF_LAYER),
+            np.ones(len(A)),
+        )
+
+
+# --- The tangent with a lagged element pressure: consistency, the volume's derivatives, -----------
+
+
+KAPPA = 500.0
+
+
+@pytest.fixture(scope="module")
+def system() -> SealSystem:
+    return build_system(oring(density=1))
+
+
+@pytest.fixture(scope="module")
+def problem(system: SealSystem) -> Problem:
+    return contact_problem(system, 1.0)
+
+
+@pytest.fixture
+def state(system: SealSystem, rng: np.random.Generator) -> Array:
+    x = system.at_rest()
+    u = 0.02 * (system.mesh.points - system.mesh.points.mean(axis=0))
+    system.displacements(x)[:] = u + (1e-4 * rng.normal(size=u.size)).reshape(u.shape)
+    return x
+
+
+def lagged(problem: Problem, pressures: Array) -> LaggedPressure:
+    return LaggedPressure.of(
+        problem, ("solid",), load_kernel("follower_pressure"), pressures, KAPPA
+    )
+
+
+def volumes(system: SealSystem, x: Array) -> Array:
+    """Volumes of the rings by Pappus: area times the path of the centroid, in closed form."""
+    a = system.deformed(x)[system.mesh.quads]
+    b = np.roll(a, -1, axis=1)
+    cross = a[..., 0] * b[..., 1] - b[..., 0] * a[..., 1]
+    return np.asarray(2.0 * np.pi * ((a[..., 1] + b[..., 1]) * cross).sum(axis=1) / 6.0)
+
+
+def test_with_the_true_pressures_the_tangent_is_the_problem_s(
+    problem: Problem, state: Array
+) -> None:
+    own = lagged(problem, element_pressures(problem, ("solid",), state))
+    r, K = own.linearise(state)
+    r0, K0 = problem.linearise(state)
+    assert np.array_equal(r, r0)
+    assert np.array_equal(r, own.residual(state)) or r == pytest.approx(own.residual(state))
+    assert K.data == pytest.approx(K0.data, rel=1e-12, abs=1e-9)
+
+
+def test_an_excess_pressure_adds_the_second_derivative_of_the_volume(
+    system: SealSystem, problem: Problem, state: Array, rng: np.random.Generator
+) -> None:
+    excess = rng.normal(size=len(system.mesh.quads))
+    pressures = element_pressures(problem, ("solid",), state)
+    dx = np.zeros_like(state)
+    moved = system.displacements(dx)
+    moved[:] = rng.normal(size=moved.shape)
+    added = lagged(problem, pressures + excess).linearise(state)[1] @ dx
+    added = added - problem.linearise(state)[1] @ dx
+    h = 1e-3
+    second = volumes(system, state + h * dx) - 2 * volumes(system, state)
+    second = (second + volumes(system, state - h * dx)) / h**2
+    assert dx @ added == pytest.approx(excess @ second, rel=1e-6)
+
+
+def test_pressures_follow_the_linearised_volume(
+    system: SealSystem, problem: Problem, state: Array, rng: np.random.Generator
+) -> None:
+    start = lagged(problem, np.zeros(len(system.mesh.quads)))
+    assert start.volumes == pytest.approx(volumes(system, system.at_rest()), rel=1e-3)
+    dx = np.zeros_like(state)
+    moved = system.displacements(dx)
+    moved[:] = 1e-7 * rng.normal(size=moved.shape)
+    change = KAPPA * (volumes(system, state + dx) - volumes(system, state)) / start.volumes
+    pressures = start.after(state, state + dx).pressures
+    before = element_pressures(problem, ("solid",), state)
+    assert pressures - before == pytest.approx(change, rel=1e-4, abs=1e-8)
+    assert np.abs(change).max() > 1e-5  # there was something to see
