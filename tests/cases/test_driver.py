@@ -541,7 +541,7 @@ def apart(diameter: float, *which: str) -> dict[str, float]:
     return {name: getattr(piston, name) / getattr(rod, name) - 1.0 for name in names}
 
 
-@pytest.mark.parametrize("stroke", ["out", "in"])
+@pytest.mark.parametrize("stroke", ["in", pytest.param("out", marks=pytest.mark.slow)])
 def test_piston_and_rod_are_one_where_curvature_vanishes(stroke: str) -> None:
     assert max(map(abs, apart(LARGE, stroke).values())) < 1e-3
 

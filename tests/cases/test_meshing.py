@@ -271,7 +271,10 @@ def test_a_polygon_that_runs_into_itself_is_seen() -> None:
 # --- Meshes of outlines: sound elements, exact boundaries, families of one density ----------------
 
 
-OUTLINE_DENSITIES = [Fraction(2, 3), 1, Fraction(5, 3), 2, 3, 4]
+OUTLINE_DENSITIES = [
+    *(Fraction(2, 3), 1, Fraction(5, 3)),
+    *(pytest.param(d, marks=pytest.mark.slow) for d in (2, 3, 4)),
+]
 WEDGE = [(-1.0, 25.0), (1.2, 25.0), (1.7, 27.6), (0.4, 26.8), (-1.1, 28.5)]
 
 
@@ -372,7 +375,7 @@ def test_the_patch_test_is_passed(name: str) -> None:
 # --- Meshes of sections that a cut parts into two regions -----------------------------------------
 
 
-PARTED_DENSITIES = [Fraction(5, 3), 1, 2, 4]
+PARTED_DENSITIES = [Fraction(5, 3), 1, *(pytest.param(d, marks=pytest.mark.slow) for d in (2, 4))]
 
 
 def capped() -> Shape:
@@ -526,7 +529,7 @@ def meshes(name: str) -> tuple[SectionMesh, SectionMesh]:
     return old, section_mesh(shape, film, Sizes(42, fine, 0.01), 2)
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", ["ring", pytest.param("horn", marks=pytest.mark.slow)])
 def test_linear_fields_are_exact_and_quadratic_ones_nearly(name: str) -> None:
     old, new = meshes(name)
     sag = 0.006  # of the old boundary: what is outside gets what is nearest
@@ -542,7 +545,7 @@ def test_linear_fields_are_exact_and_quadratic_ones_nearly(name: str) -> None:
     assert same == pytest.approx(np.sin(old.points), abs=1e-12)
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", ["ring", pytest.param("horn", marks=pytest.mark.slow)])
 def test_values_of_elements_are_those_at_their_middles(name: str) -> None:
     old, new = meshes(name)
     values = old.points[old.quads].mean(axis=1)[:, 0]

@@ -465,7 +465,7 @@ def test_without_an_estimate_only_the_way_is_another(curve: Outcome[FilmState]) 
     assert isnan(estimated(1.0, nan, 5 / 6).h_star)
 
 
-@pytest.mark.parametrize("density", [1, 2])
+@pytest.mark.parametrize("density", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_density_one_is_not_ok(density: Literal[1, 2]) -> None:
     # h* of density 1 is 2.3 % too small, and its estimate says 1 % too large
     (state,) = run(Seal(density=density, stroke="out", speeds=(60.0,)), Silent()).states

@@ -537,7 +537,9 @@ def layout_of(number: int) -> Layout:
     return layout.between(layout, ends).graded(spacing, long, 0.01)
 
 
-@pytest.mark.parametrize("number", range(10))
+@pytest.mark.parametrize(
+    "number", [pytest.param(n, marks=[pytest.mark.slow] * (n > 3)) for n in range(10)]
+)
 def test_the_mesh_of_any_outline_is_sound_and_passes_the_patch_test(number: int) -> None:
     layout = layout_of(number)
     mesh, outline = layout.mesh(2), layout.shape.outline

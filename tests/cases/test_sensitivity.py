@@ -161,7 +161,13 @@ def test_every_derivative_agrees_with_central_differences(name: str) -> None:
             assert abs(found[quantity][key] - expected[quantity]) <= 1e-5 * scale, (key, quantity)
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(n, marks=[pytest.mark.slow] * (n not in ("thinning", "conserving")))
+        for n in CASES
+    ],
+)
 def test_direct_and_adjoint_agree(name: str) -> None:
     """How the film moves with each parameter is solved for, instead of the adjoints."""
     case, x = state(name)

@@ -226,7 +226,13 @@ def test_a_film_without_pressure_has_no_load_and_is_torn_where_its_gap_widens() 
     assert widening.rupture_mm == pytest.approx(-1.5, abs=0.01)
 
 
-@pytest.mark.parametrize("p", [WEDGE, EXPONENTIAL, Slider(), Slider(profile="cosine")])
+@pytest.mark.parametrize(
+    "p",
+    [
+        *(WEDGE, EXPONENTIAL, Slider()),
+        pytest.param(Slider(profile="cosine"), marks=pytest.mark.slow),
+    ],
+)
 def test_ok_is_within_two_per_cent(p: Slider) -> None:
     fine = row(p.model_copy(update={"segments": 3000}))
     for segments in (6, 12, 25, 50, 100):
@@ -490,7 +496,10 @@ def rough_exact(p: Slider) -> tuple[float, float]:
     return float(q), float(load)
 
 
-@pytest.mark.parametrize("roughness", [(0.0, 0.4), (0.5, 0.0), (0.3, 0.2)])
+@pytest.mark.parametrize(
+    "roughness",
+    [(0.3, 0.2), *(pytest.param(r, marks=pytest.mark.slow) for r in ((0.0, 0.4), (0.5, 0.0)))],
+)
 def test_the_rough_wedge_by_quadrature(roughness: tuple[float, float]) -> None:
     sigma = 1e-3 * math.hypot(*roughness)
     p = Slider.model_validate(

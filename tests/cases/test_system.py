@@ -264,7 +264,7 @@ def test_newton_converges_quadratically_with_it() -> None:
     assert checked > 3
 
 
-@pytest.mark.parametrize("reynolds", TREATMENTS)
+@pytest.mark.parametrize("reynolds", ["fe", pytest.param("dg", marks=pytest.mark.slow)])
 def test_it_damps_the_oscillation_and_amplifies_it_with_its_sign_reversed(reynolds: str) -> None:
     """At 400 mm/s; measured 0.017, 0.057, 0.75 for "fe" and 0.014, 0.094, 0.61 for "dg"."""
     damped, plain, amplified = (

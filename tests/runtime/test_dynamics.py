@@ -75,8 +75,14 @@ def last(study: Study, **given: Any) -> Any:
     return steps(study, **given)[-1]
 
 
-@pytest.mark.parametrize("method", ALL)
-@pytest.mark.parametrize("c", [0.0, 0.4])
+@pytest.mark.parametrize(
+    ("method", "c"),
+    [
+        *((method, 0.4) for method in ALL),
+        ("explicit", 0.0),
+        *(pytest.param(method, 0.0, marks=pytest.mark.slow) for method in ALL[:3]),
+    ],
+)
 def test_orders_are_two(method: str, c: float) -> None:
     study = oscillator(**({"c": c} if c else {}))
     truth = exact(2.0, c)

@@ -81,7 +81,11 @@ def in_series(driven: str) -> Study:
 
 
 @pytest.mark.parametrize(
-    ("driven", "step"), [("force", 0.2), ("fix", 10.0), ("tie", 0.2), ("both", 10.0)]
+    ("driven", "step"),
+    [
+        *(("force", 0.2), ("fix", 10.0), ("tie", 0.2)),
+        pytest.param("both", 10.0, marks=pytest.mark.slow),
+    ],
 )
 def test_a_snap_back_is_followed_however_it_is_driven(driven: str, step: float) -> None:
     """The end is at t = w + F / c, which turns where F' = -c: at w = H (1 -+ 1/2)."""

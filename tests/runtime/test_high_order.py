@@ -103,7 +103,9 @@ def solved(mesh: Mesh, k: float, given: Any) -> Array:
     return study.solve().values("u")
 
 
-@pytest.mark.parametrize("kind", ["line5", "quad16", "quad49", "hex64"])
+@pytest.mark.parametrize(
+    "kind", ["line5", "quad16", "quad49", pytest.param("hex64", marks=pytest.mark.slow)]
+)
 def test_patch(kind: str) -> None:
     mesh = unit(kind, 2).map(bent)
     slope = np.array([1.0, -2.0, 0.5])[: mesh.dimension]
@@ -114,7 +116,8 @@ def test_patch(kind: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "sizes"),
     [
-        *(("quad16", (3, 6)), ("quad25", (2, 4)), ("quad36", (1, 2))),
+        *(("quad16", (3, 6)), ("quad25", (2, 4))),
+        pytest.param("quad36", (1, 2), marks=pytest.mark.slow),
         pytest.param("hex64", (2, 4), marks=pytest.mark.slow),
     ],
 )

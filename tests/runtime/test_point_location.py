@@ -42,7 +42,10 @@ def positions(mesh: Mesh, found: Located) -> Array:
     return x
 
 
-@pytest.mark.parametrize(("shape", "order"), SHAPES)
+@pytest.mark.parametrize(
+    ("shape", "order"),
+    [pytest.param(*s, marks=[pytest.mark.slow] * (s == ("hex", 6))) for s in SHAPES],
+)
 def test_points_of_bent_cells_are_in_them(shape: str, order: int, rng: np.random.Generator) -> None:
     mesh = bent(shape, order)
     ((kind, nodes),) = mesh.cells.items()

@@ -52,7 +52,9 @@ def body(kind: str) -> Study:
     return study
 
 
-@pytest.mark.parametrize("kind", BODIES)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=[pytest.mark.slow] * (k in ("hex27", "tet10"))) for k in BODIES]
+)
 def test_pressure_all_around_shrinks_a_body_alike(kind: str) -> None:
     """sigma = -p: mu (s^2 - 1) + lame d ln s = -p s^d with the stretch s in each of d directions.
 
