@@ -1,13 +1,23 @@
-"""Patch test, rigid motion, symmetry and objectivity of the axisymmetric solids."""
+"""Solids against theory: patches, a thick cylinder, rolling with friction."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
+from scipy.integrate import quad as integrate
 
+from softehl import Mesh, Study
+from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.kernel import load_kernel
-from tests.reference.calling import Part, assemble, call, fitted_order
+from softehl.runtime.results.result import Result
+from tests.reference.calling import Part, assemble, call, fitted_order, solve
 from tests.reference.states import SOLIDS, State, displacement, quad, solid_states
+
+# --- Patch test, rigid motion, symmetry and objectivity of the axisymmetric solids ----------------
+
 
 PAPER = (3.04, 0.62, 500.0)
 CELLS = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
@@ -186,3 +196,174 @@ def test_mirror_image_has_mirrored_forces(family: str) -> None:
     )
     image = (forces[0].reshape(4, 2) * mirror)[order].ravel()
     np.testing.assert_allclose(forces[1], image, rtol=0, atol=1e-11 * np.abs(forces).max())
+
+
+# --- Pressurised thick-walled Mooney-Rivlin cylinder with an axial stretch against its closed -----
+
+
+INSIDE, OUTER, HEIGHT = 1.0, 2.0, 0.3
+MU = (1.0, 0.6)
+KAPPA = 1e7  # compressibility changes the pressure by about MU / KAPPA
+BORE = 1.4  # deformed inner radius of the closed form
+
+
+def radius(R: float, stretch: float, bore: float = BORE) -> float:
+    return float(np.sqrt(bore**2 + (R**2 - INSIDE**2) / stretch))
+
+
+def exact_pressure(stretch: float, bore: float = BORE, mu: tuple[float, float] = MU) -> float:
+    """The closed-form integral (MPa)."""
+
+    def integrand(r: float) -> float:
+        R = np.sqrt(INSIDE**2 + stretch * (r**2 - bore**2))
+        hoop, radial = r / R, R / (r * stretch)
+        first, second = hoop**2 - radial**2, hoop**-2 - radial**-2
+        return float((mu[0] * first - mu[1] * second) / r)
+
+    return float(
+        integrate(integrand, bore, radius(OUTER, stretch, bore), epsabs=1e-14)[0]
+    )
+
+
+def cylinder(family: str, count: int, pressure: float, kappa: float = KAPPA) -> list[Part]:
+    """One row of elements through the wall, numbered (bottom, top) from the bore outwards."""
+    R = np.linspace(INSIDE, OUTER, count + 1)
+    nodes = np.array([(z, r) for r in R for z in (0.0, HEIGHT)])
+    column = 2 * np.arange(count)[:, None]
+    cells = column + np.array([[0, 1, 3, 2]])
+    maps = (2 * cells[:, :, None] + np.arange(2)).reshape(count, 8)
+    # the bore runs along +z: the solid is on its left
+    return [
+        Part(family, nodes[cells].reshape(count, 8), maps, (*MU, kappa)),
+        Part("follower_pressure", nodes[:2].reshape(1, 4), np.array([[0, 1, 2, 3]]), (pressure,)),
+    ]
+
+
+def bore_of(
+    family: str,
+    count: int,
+    pressure: float,
+    stretch: float = 1.0,
+    *,
+    kappa: float = KAPPA,
+    guess: float = BORE,
+) -> float:
+    """Deformed inner radius under the pressure, axial displacements prescribed."""
+    parts = cylinder(family, count, pressure, kappa)
+    R = np.linspace(INSIDE, OUTER, count + 1)
+    x = np.zeros(4 * (count + 1))
+    x[2::4] = (stretch - 1) * HEIGHT
+    x[1::4] = x[3::4] = [radius(r, stretch, guess) - r for r in R]
+    u = solve(parts, x, np.arange(1, x.size, 2), tolerance=1e-9)  # kappa / mu takes six digits
+    assert u[1] == pytest.approx(u[3], abs=1e-9)
+    return INSIDE + float(u[1])
+
+
+@pytest.mark.parametrize("stretch", [1.0, 0.8])
+@pytest.mark.parametrize("family", ["solid_fbar", "solid_taylor", "solid_taylor_mean"])
+def test_bore_converges_with_second_order_to_the_closed_form(family: str, stretch: float) -> None:
+    counts = (8, 16, 32, 64)
+    pressure = exact_pressure(stretch)
+    errors = [abs(bore_of(family, n, pressure, stretch) - BORE) for n in counts]
+    assert errors[-1] < 2e-5 * (BORE - INSIDE)
+    assert 1.95 < -fitted_order(counts, errors) < 2.1
+
+
+@pytest.mark.parametrize("family", ["solid_fbar", "solid_taylor", "solid_taylor_mean"])
+def test_a_wrong_pressure_or_material_is_noticed(family: str) -> None:
+    """A material with mu_2 counted as mu_1 agrees in plane strain only, as it should."""
+    swapped = (MU[0] + MU[1], 0.0)
+    assert exact_pressure(1.0, mu=swapped) == pytest.approx(exact_pressure(1.0), rel=1e-12)
+    counts = (4, 8, 16)
+    wrong = [abs(bore_of(family, n, exact_pressure(0.8, mu=swapped), 0.8) - BORE) for n in counts]
+    assert not 1.85 < -fitted_order(counts, wrong) < 2.1
+
+
+def test_plain_element_locks_and_so_fails_the_same_test() -> None:
+    counts, bore = (4, 8, 16), 1.05
+    pressure = exact_pressure(1.0, bore)
+    errors = [
+        abs(bore_of("solid_q4", n, pressure, guess=INSIDE) - bore) for n in counts
+    ]
+    assert errors[0] > 0.1 * (bore - INSIDE)
+    assert not 1.85 < -fitted_order(counts, errors) < 2.1
+
+
+def test_reactions_balance_the_pressure_on_a_shell_between_two_radii() -> None:
+    """At the solution the free rows vanish; the axial reactions carry the axial stress alone."""
+    pressure = exact_pressure(1.0)
+    parts = cylinder("solid_fbar", 8, pressure)
+    x = np.zeros(36)
+    R = np.linspace(INSIDE, OUTER, 9)
+    x[1::4] = x[3::4] = [radius(r, 1.0) - r for r in R]
+    x = solve(parts, x, np.arange(1, 36, 2), tolerance=1e-9)
+    total, _ = assemble(parts, x)
+    assert np.abs(total[1::2]).max() < 1e-7 * np.abs(total).max()
+    assert total[0::4].sum() == pytest.approx(-total[2::4].sum(), rel=1e-9)
+
+
+# --- Coulomb's friction: the stick of Cattaneo and Mindlin, and full sliding with hysteresis ------
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "gallery" / "models" / "block.py"
+COULOMB, G, NU, RADIUS = 0.3, 1.0, 0.4999, 10.0
+BULK = 2 * G * (1 + NU) / (3 * (1 - 2 * NU))
+
+
+def spread(s: Array) -> Array:
+    """Equal cells to 1.4 mm on either side, then growing to 100 mm."""
+    far = np.expm1(14 * np.maximum(abs(s) - 0.55, 0)) / 14
+    return np.asarray(np.sign(s) * 1.4 / 0.55 * (np.minimum(abs(s), 0.55) + far))
+
+
+def widths(x: Array) -> Array:
+    order = np.argsort(x[:, 0])
+    return np.asarray(np.gradient(x[order, 0])[np.argsort(order)])
+
+
+def stresses(result: Result) -> tuple[Array, Array, Array]:
+    """Width of the nodes, their pressure and tangential stress."""
+    nodes = result.system.blocks["roller"].nodes[:, 0]
+    p, tau = result.values("lambda"), result.values("tau")
+    return widths(result.system.mesh.points[nodes]), np.maximum(-p, 0), tau
+
+
+def pushed(n: int, shift: float) -> list[Result]:
+    """Steps of a roller that is pressed 0.4 mm deep, then pushed by `shift`."""
+    study = Study(Mesh.rectangle(2, 1, cells=(2 * n, n)).map(lambda x: spread(x - 1)))
+    study.add("block", PAGE, G=G, K=BULK)
+    given: dict[str, Any] = {"area": widths, "rho": lambda x: G / widths(x)}
+    given["c"] = lambda x: -(x[:, 0] ** 2) / (2 * RADIUS)
+    given |= {"n_z": 0.0, "n_r": -1.0, "offset": 0.0, "friction": COULOMB}
+    study.add("roller", "contact_friction", on="top", **given)
+    study.fix("bottom", u_r=lambda x, t: 0.4 * min(t, 1), u_z=lambda x, t: shift * max(t - 1, 0))
+    pressed, path = study.solve(steps=4), list[Result]()
+    study.solve(steps=4, start=pressed, until=2.0, on_step=path.append)
+    return path
+
+
+def departure(path: list[Result], friction: float) -> float:
+    """Largest error of the stick ratio against sqrt(1 - Q / (friction P)), in widths of a node."""
+    worst = 0.0
+    for result in path:
+        w, p, tau = stresses(result)
+        sticks = (p > 0) & (abs(tau) < COULOMB * p * (1 - 1e-9))
+        ratio = w[sticks].sum() / w[p > 0].sum()
+        expected = max(1 - float(abs(tau @ w) / (friction * (p @ w))), 0.0) ** 0.5
+        worst = max(worst, abs(ratio - expected) * w[p > 0].sum() / (2 * w[p > 0].max()))
+    return worst
+
+
+def test_stick_follows_cattaneo_and_mindlin() -> None:
+    """Within one node; with another coefficient of friction the same comparison fails."""
+    path = pushed(16, 0.12)
+    assert departure(path, COULOMB) < 1.0
+    assert departure(path, 1.5 * COULOMB) > 1.2
+
+
+def test_a_roller_that_slides_everywhere_carries_mu_p() -> None:
+    """|Q| = mu P to rounding, against the motion."""
+    for shift in (0.5, -0.5):
+        w, p, tau = stresses(pushed(12, shift)[-1])
+        assert tau @ w == pytest.approx(-np.sign(shift) * COULOMB * (p @ w), rel=1e-9)
+        assert np.all(abs(abs(tau) - COULOMB * p) <= 1e-9 * p.max())
