@@ -19,7 +19,7 @@ AT = (sp.Rational(1, 7), sp.Rational(2, 9), sp.Rational(-1, 5))
 
 
 QUADRATIC = {name: kind for name, kind in ELEMENTS.items() if kind.lines is None}
-"""Those of higher order are in `tests/runtime/test_high_order.py`."""
+"""Those of higher order are in `tests/runtime/test_cells.py`."""
 
 
 @pytest.mark.parametrize("kind", QUADRATIC.values(), ids=QUADRATIC)

@@ -1,9 +1,10 @@
-"""Kernels of random pages of fields on all cells, against what the pages mean in many digits."""
+"""Random pages against what they mean: cells, branches, states far from rest, mistakes."""
 
 from __future__ import annotations
 
 import random
 import re
+import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -14,16 +15,35 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from hypothesis import HealthCheck, Phase, assume, given, settings
+from hypothesis import strategies as st
 
 from softehl.codegen import pipeline
+from softehl.codegen.abi import Target
+from softehl.codegen.elements import quadrature
+from softehl.codegen.graph.evaluation import State, Walk
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.errors import ModelError
-from softehl.codegen.tools import build, output_files
+from softehl.codegen.language.model import Model
+from softehl.codegen.tools import build, model_loader, output_files
+from softehl.codegen.tools.model_text import ModelFileError
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS
-from tests.codegen.nested_models import DIGITS, STEP, NoValueError
+from tests.codegen.nested_models import (
+    DIGITS,
+    STEP,
+    Nested,
+    NoValueError,
+    Tree,
+    drawn,
+)
+from tests.codegen.random_models import UNKNOWNS, OutsideError, Recipe, expressions, recipes
 from tests.codegen.random_pages import FIRST, TASKS, Meaning, RandomPage, moved, random_page
+from tests.codegen.test_properties import error, expected
+
+# --- Kernels of random pages of fields on all cells, against what the pages mean in many digits ---
+
 
 PAGES = 16
 NOT_REAL = re.compile("real numbers|non-real|not comparable|NaN|nan|zoo|oo|zero|imaginary")
@@ -297,3 +317,268 @@ def test_random_pages_on_all_cells(tmp_path: Path, first: int) -> None:
             reached[kind] += c.agrees(z)
     assert reached["any"] >= 6, reached
     assert reached.total() > reached["any"], reached  # special states, too
+
+
+# --- Random pages: SymPy's derivatives through names are the model's; errors name their line ------
+
+
+FUZZ = settings(
+    derandomize=True,
+    max_examples=30,
+    database=None,
+    deadline=None,
+    phases=[Phase.generate],
+    suppress_health_check=list(HealthCheck),
+)
+A, B = sp.symbols("a b", real=True)
+AT = (0.37, -0.81, 1.23)
+
+
+@given(
+    expressions(UNKNOWNS, 4),
+    expressions((*UNKNOWNS, A), 4),
+    expressions((*UNKNOWNS, A, B), 5),
+    st.sampled_from(["x", "y", "z", "a", "b"]),
+)
+@FUZZ
+def test_sympy_and_the_model_differentiate_alike(a: Any, b: Any, w: Any, by: str) -> None:
+    """Values of sp.diff(W, s) and m.derivative(W, s), for inputs and for names, in 50 digits."""
+    m = Model("fuzz", nodes=1, rule=quadrature.point_rule())
+    known: dict[Any, Any] = {u: m.unknown(str(u)) for u in UNKNOWNS}
+    for symbol, value in ((A, a + UNKNOWNS[0] / 3), (B, b + A * UNKNOWNS[1])):
+        known[symbol] = m.define(str(symbol), value.xreplace(known))
+    W = (w + A * B).xreplace(known)
+    s = next(v for k, v in known.items() if str(k) == by)
+    try:
+        theirs = m._lower(sp.diff(W, s))
+    except ModelError as error:  # SymPy's |log y|' holds imaginary parts
+        assume("real numbers" not in str(error))
+        raise
+    ours = m._lower(m.derivative("slope", W, s))
+    with mpmath.workdps(50):
+        walk = Walk(State((), AT), {})
+        try:
+            found, expected = walk.value(theirs), walk.value(ours)
+            smooth = abs(found) < 1e30
+        except (ArithmeticError, ValueError, TypeError):
+            smooth = False  # no real value there
+        assume(smooth)
+        assert abs(found - expected) <= mpmath.mpf(10) ** -30 * (1 + abs(expected))
+
+
+PAGE = """
+import sympy as sp
+from softehl import Definition, Model, quadrature
+
+def page() -> Definition:
+    m = Model("page", nodes=1, rule=quadrature.gauss(2, 1))
+    u, v = m.unknown("u"), m.unknown("v")
+    (k,) = m.parameters(k="stiffness")
+    a = m.define("a", u**2 + v)
+    s = m.implicit("s", lambda s: s**3 + s - a, start=u)
+    m.potential(m.integral("Pi", k * a**2 + s * u))
+    return m.finish()
+"""
+LEGAL = ("u**2 + v", "s**3 + s - a", "k * a**2 + s * u", "start=u", '"a"', '"page"', "2, 1", "k=")
+WRONG = (
+    *(
+        "1 / 0",
+        "sp.oo",
+        "0.1 * u",
+        "w",
+        "sp.gamma(u)",
+        "sp.I * u",
+        "u if u > 0 else v",
+        "1 / (u - u)",
+    ),
+    *("sp.Matrix([u, v])", "sp.diff(s, u)", "sp.Piecewise((u, u > 0))", "'text +'", "None", "[u]"),
+    *(
+        '"a b"',
+        '""',
+        "sp.Symbol('a', real=True)",
+        "sp.Derivative(u**2, u)",
+        "0, 1",
+        "2, 9",
+        "'x', 1",
+    ),
+    *("sp.nan", "s.subs(u, 1)", "lambda: u", "u.missing", "u +* v", "m.unknown('u')"),
+)
+
+
+@given(st.sampled_from(LEGAL), st.sampled_from(WRONG))
+@FUZZ
+def test_a_page_is_right_or_an_error_with_its_line(
+    tmp_path_factory: pytest.TempPathFactory, legal: str, wrong: str
+) -> None:
+    """One part of a page replaced by something strange: no error but ours, and it names a line."""
+    path: Path = tmp_path_factory.mktemp("fuzz") / "page.py"
+    path.write_text(PAGE.replace(legal, wrong, 1))
+    message = ""
+    try:
+        (d,) = model_loader.definitions(path)
+        assert d.name
+    except ModelFileError as error:
+        message = str(error)
+    assert not message or re.fullmatch(r"\S*page\.py:\d+: .+", message), message
+
+
+# --- Sides of nested branches that are not chosen: nothing of them reaches a result, in any -------
+
+
+Q = sp.Rational
+T, x = ("T",), ("x",)
+ROOT = ("sqrt", T)
+NAMED = ("named", ROOT)
+
+
+def number(a: int, b: int) -> Tree:
+    return ("number", Q(a, b))
+
+
+def either(a: Tree, b: Tree, then: Tree, otherwise: Tree) -> Tree:
+    """`then` where a < b."""
+    return ("pieces", a, b, then, otherwise, True)
+
+
+_LOGARITHM = ("log", ("+", number(1, 7), ("*", T, T)))
+_LOW = either(number(1, 5), T, ROOT, _LOGARITHM)
+_MIDDLE = either(_LOW, x, _LOW, ("*", x, x))
+TREES = {
+    "three_deep": either(_MIDDLE, T, _MIDDLE, ("*", T, x)),
+    "name_in_two": (
+        "+",
+        either(number(1, 5), x, ("*", NAMED, x), ("*", x, x)),
+        either(number(3, 10), x, ("*", NAMED, ("*", x, x)), x),
+    ),
+    "each_point": either(number(1, 5), x, ("*", ROOT, x), x),
+    "one_over": (
+        "+",
+        either(number(1, 5), x, ("*", ("named", ("1/", ("max", T, number(0, 1)))), x), x),
+        either(x, number(0, 1), ("log", ("max", T, number(0, 1))), x),
+    ),
+}
+
+
+def compiled(models: Sequence[Nested], target: Target, folder: Path) -> None:
+    """All kernels of some models in one library."""
+    made = [pipeline.compile_model(m.definition(), target) for m in models]
+    for name, text in output_files.files(made).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    build.build(folder, extra=(*build.STRICT, "-O1"))
+
+
+def checked(model: Nested, folder: Path, seed: int, states: int = 8) -> int:
+    """Compare all tasks at random states; the number of states with a value."""
+    kernel, rng, done = load_kernel(model.name, folder), random.Random(seed), 0
+    for _ in range(60):
+        dofs, k = [rng.uniform(-1.5, 1.5) for _ in range(3)], rng.uniform(-1, 1)
+        try:
+            expected = model.tangent(dofs, k)
+        except NoValueError:
+            continue
+        R, K = (np.array(v, dtype=float) for v in expected)
+        scale = max(1.0, abs(R).max(), abs(K).max())
+        batch = np.array([[0.1, 0.2, 0.3], [1.2, 0.8, 0.9], dofs, [0.1, 0.2, 0.3], [1.2, 0.8, 0.9]])
+        nowhere, given = np.empty((5, 0)), {"parameters": [k]}
+        along, w = np.ones((5, 1)), np.array([0.3, -0.7, 0.4])
+        residual, tangent = kernel.tangent(nowhere, batch, **given)
+        for found, right in (
+            (residual, R),
+            (tangent, K[:, :3]),
+            (kernel.product(nowhere, batch, np.tile(w, (5, 1)), **given), K[:, :3] @ w),
+            (kernel.derivative("k", nowhere, batch, **given), K[:, 3]),
+            (kernel.pseudo_load(nowhere, batch, along, **given), K[:, 3]),
+        ):
+            np.testing.assert_allclose(found[2], right, rtol=0, atol=1e-8 * scale)
+        done += 1
+        if done == states:
+            break
+    return done
+
+
+def test_nothing_of_a_side_that_is_not_chosen_reaches_a_task(tmp_path: Path) -> None:
+    models = [Nested(name, tree) for name, tree in TREES.items()]
+    compiled(models, Target.SIMD, tmp_path)
+    for m in models:
+        assert checked(m, tmp_path, seed=1, states=20) > 5, m.name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", [Target.SIMD, Target.SCALAR])
+def test_random_branches_in_branches(tmp_path: Path, target: Target) -> None:
+    models = []
+    for seed in range(80):
+        m = Nested(f"drawn_{seed}", drawn(random.Random(seed), 4))
+        try:
+            m.definition()
+        except (ModelError, TypeError, ValueError):  # SymPy has found numbers that are not real
+            continue
+        models.append(m)
+    compiled(models, target, tmp_path)
+    assert sum(checked(m, tmp_path, seed) for seed, m in enumerate(models)) > 200
+
+
+# --- 200 random pages far from rest: C against 50 digits at unknowns from 1e-3 to 1e3 -------------
+
+
+WIDE_PAGES = 200
+STATES = 6
+HUGE = 1e150
+"""No value above: its square is still a double."""
+EPSILON = 2.0**-52
+
+
+def wide_recipes(count: int) -> list[Recipe]:
+    found: list[Recipe] = []
+
+    @settings(
+        derandomize=True,
+        max_examples=count,
+        database=None,
+        deadline=None,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(recipes(wide=True))
+    def collect(recipe: Recipe) -> None:
+        found.append(recipe)
+
+    collect()
+    return found
+
+
+def wide_states(seed: int) -> list[tuple[float, ...]]:
+    rng = random.Random(seed)
+    return [
+        tuple(rng.choice((-1, 1)) * 10 ** rng.uniform(-3, 3) for _ in range(4))
+        for _ in range(STATES)
+    ]
+
+
+@pytest.mark.slow
+def test_random_pages_are_right_far_from_rest() -> None:
+    folder = Path(tempfile.mkdtemp(prefix="wide_states_"))
+    pages = {f"wide_{k}": recipe for k, recipe in enumerate(wide_recipes(WIDE_PAGES))}
+    models = [recipe.definition(name) for name, recipe in pages.items()]
+    for name, text in output_files.files([pipeline.compile_model(d) for d in models]).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    build.build(folder, extra=(*build.STRICT, "-O0"))
+    wrong, compared, overflows = {}, 0, 0
+    for k, (name, recipe) in enumerate(pages.items()):
+        kernel = load_kernel(name, folder)
+        for state in wide_states(k):
+            try:
+                exact = expected(recipe, state)
+            except (OutsideError, ZeroDivisionError, OverflowError):
+                continue
+            if any(not abs(v) + b < HUGE for pairs in exact.values() for v, b in pairs):
+                continue
+            off = error(kernel, {"state": state, **exact})
+            compared += 1
+            overflows += not np.isfinite(off)
+            if np.isfinite(off) and off > 1e-10:
+                wrong[name, state] = off
+    print(f"{len(pages)} pages, {compared} states compared, {overflows} not-a-number in C")
+    assert wrong == {}
+    assert compared > WIDE_PAGES
+    assert overflows < compared / 50

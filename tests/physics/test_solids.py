@@ -220,9 +220,7 @@ def exact_pressure(stretch: float, bore: float = BORE, mu: tuple[float, float] =
         first, second = hoop**2 - radial**2, hoop**-2 - radial**-2
         return float((mu[0] * first - mu[1] * second) / r)
 
-    return float(
-        integrate(integrand, bore, radius(OUTER, stretch, bore), epsabs=1e-14)[0]
-    )
+    return float(integrate(integrand, bore, radius(OUTER, stretch, bore), epsabs=1e-14)[0])
 
 
 def cylinder(family: str, count: int, pressure: float, kappa: float = KAPPA) -> list[Part]:
@@ -282,9 +280,7 @@ def test_a_wrong_pressure_or_material_is_noticed(family: str) -> None:
 def test_plain_element_locks_and_so_fails_the_same_test() -> None:
     counts, bore = (4, 8, 16), 1.05
     pressure = exact_pressure(1.0, bore)
-    errors = [
-        abs(bore_of("solid_q4", n, pressure, guess=INSIDE) - bore) for n in counts
-    ]
+    errors = [abs(bore_of("solid_q4", n, pressure, guess=INSIDE) - bore) for n in counts]
     assert errors[0] > 0.1 * (bore - INSIDE)
     assert not 1.85 < -fitted_order(counts, errors) < 2.1
 

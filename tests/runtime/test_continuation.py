@@ -1,4 +1,4 @@
-"""Continuation on paths in closed form: lines, a circle, the Bratu fold, a von Mises truss."""
+"""Paths: continuation, arc length, bifurcations."""
 
 from __future__ import annotations
 
@@ -7,18 +7,29 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
 
+from softehl import Definition, Model, quadrature
+from softehl.runtime.analyses.bifurcation import MissedBifurcations, critical_point
 from softehl.runtime.arrays import Array
+from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.solve.arclength import Arclength
 from softehl.runtime.solve.continuation import Continuation, Predictor, StepRule
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Branch, NotConverged, Point, Status
+from softehl.runtime.study import Study, StudyError
+from tests.runtime.field_pages import rubber_by_log as rubber
 from tests.runtime.test_newton import Algebraic
+from tests.runtime.touching_bodies import elastic
+
+# --- Continuation on paths in closed form: lines, a circle, the Bratu fold, a von Mises truss -----
 
 
 def line(p: float) -> Algebraic:
@@ -414,3 +425,252 @@ def test_start_on_a_limit_point_is_singular() -> None:
 def test_start_out_of_bounds_is_rejected() -> None:
     with pytest.raises(ValueError, match="outside"):
         arc().follow(circle, 0.0, np.ones(1), within=(0.5, 1.0))
+
+
+# --- Paths by arc length over a study: limit points of a shallow truss, refusals, what was --------
+
+
+RISE = 0.2
+
+
+@cache
+def shallow_truss() -> Definition:
+    """A node that moves by w between two shallow bars: W = k / 2 (w^2 / 2 - H w)^2."""
+    m = Model("truss", nodes=1, rule=quadrature.point_rule())
+    ((w,),) = m.nodal_unknowns("w")
+    k, H = m.parameters(k="stiffness", H="height")
+    m.potential(k / 2 * (w**2 / 2 - H * w) ** 2)
+    return m.finish()
+
+
+def shallow(k: float = 100.0) -> Study:
+    study = Study(Mesh.line(1.0, cells=1))
+    study.add("truss", shallow_truss(), on=lambda x: x[:, 0] == 0.0, k=k, H=RISE)
+    study.load((0.0,), w=1.0)
+    return study
+
+
+def test_a_truss_snaps_through() -> None:
+    """t = k w (w / 2 - H) (w - H) turns at w = H (1 -+ 1 / sqrt 3)."""
+    study = shallow()
+    path = study.follow(step=0.01, until=lambda r: r.values("w")[0] > 2.1 * RISE)
+    w = np.array([r.values("w")[0] for r in path.results])
+    t = np.array([r.t for r in path.results])
+    np.testing.assert_allclose(t, 100.0 * w * (w / 2 - RISE) * (w - RISE), atol=1e-9)
+    assert [limit.kind for limit in path.limits] == ["maximum", "minimum"]
+    turn = 100.0 * RISE**3 / (3 * np.sqrt(3))
+    found = [limit.t for limit in path.limits]
+    np.testing.assert_allclose(found, [turn, -turn], rtol=1e-9)
+    places = [limit.x[0] / RISE for limit in path.limits]
+    np.testing.assert_allclose(places, [1 - 1 / np.sqrt(3), 1 + 1 / np.sqrt(3)], rtol=1e-5)
+    assert not np.allclose(found, [1.001 * turn, -turn], rtol=1e-4), "the oracle can fail"
+
+
+@cache
+def link() -> Definition:
+    """A spring between two nodes."""
+    m = Model("link", nodes=2, rule=quadrature.point_rule())
+    ((a, b),) = m.nodal_unknowns("w")
+    (c,) = m.parameters(c="stiffness")
+    m.potential(c / 2 * (b - a) ** 2)
+    return m.finish()
+
+
+SOFT = 0.5  # of the spring in series: the truss, k (3 w^2 / 2 - 3 H w + H^2), falls to -2
+EVEN = 0.3  # of the load at the truss beside the moving end
+
+
+def in_series(driven: str) -> Study:
+    """The truss behind a spring, driven at the other end of the spring."""
+    study = Study(Mesh.line(2.0, cells=2))
+    study.add("truss", shallow_truss(), on=lambda x: x[:, 0] == 0.0, k=100.0, H=RISE)
+    study.add("spring", link(), on=[[0, 1]], c=SOFT)
+    study.add("anchor", link(), on=[[1, 2]], c=0.0)
+    study.fix((2.0,), w=0.0)
+    if driven == "force":
+        study.load((1.0,), w=1.0)
+    elif driven == "tie":
+        study.tie((1.0,), (2.0,), "w", offset=lambda x, t: t)
+    else:
+        study.fix((1.0,), w=1.0)
+    if driven == "both":
+        study.load((0.0,), w=EVEN)
+    return study
+
+
+@pytest.mark.parametrize(
+    ("driven", "step"),
+    [
+        *(("force", 0.2), ("fix", 10.0), ("tie", 0.2)),
+        pytest.param("both", 10.0, marks=pytest.mark.slow),
+    ],
+)
+def test_a_snap_back_is_followed_however_it_is_driven(driven: str, step: float) -> None:
+    """The end is at t = w + F / c, which turns where F' = -c: at w = H (1 -+ 1/2)."""
+    path = in_series(driven).follow(step=step, until=lambda r: r.values("w")[0] > 0.42)
+    w = np.array([r.values("w")[0] for r in path.results])
+    t = np.array([r.t for r in path.results])
+    force = 100.0 * w * (w / 2 - RISE) * (w - RISE)
+    theory = {"force": force, "both": (SOFT * w + force) / (SOFT + EVEN)}
+    np.testing.assert_allclose(t, theory.get(driven, w + force / SOFT), atol=2e-9)
+    assert (np.diff(w) > 0.0).all()
+    found = [limit.t for limit in path.limits]
+    turn = 100.0 * RISE**3 / (3 * np.sqrt(3))
+    limits = {"force": (turn, -turn), "both": (0.25, 0.0)}
+    np.testing.assert_allclose(found, limits.get(driven, (0.4, 0.0)), atol=2e-9)
+
+
+def test_a_path_along_which_a_spring_closes_a_gap() -> None:
+    """A corner of 72 degrees, at which no step is short enough to be smooth."""
+    m = Model("corner", nodes=1, rule=quadrature.point_rule())
+    ((w,),) = m.nodal_unknowns("w")
+    m.weak_form([(sp.Piecewise((w, w < 1), (sp.Rational(3, 2) - w / 2, True)), w)])
+    study = Study(Mesh.line(1.0, cells=1))
+    study.add("corner", m.finish(), on=lambda x: x[:, 0] == 0.0)
+    study.load((0.0,), w=1.0)
+    path = study.follow(step=0.5, until=lambda r: r.values("w")[0] > 2.0)
+    (limit,) = path.limits
+    assert limit.t == pytest.approx(1.0, abs=1e-3)
+    assert not limit.located
+
+
+def test_what_is_refused() -> None:
+    for step in (0.0, -1.0, float("nan")):
+        with pytest.raises(StudyError, match=r"must be (positive|finite)"):
+            shallow().follow(step=step, until=lambda r: True)
+    for linear in ("amg", "matrix-free"):
+        with pytest.raises(StudyError, match=f'no linear = "{linear}", it factorises'):
+            shallow().follow(step=0.1, until=lambda r: True, linear=linear)
+
+
+def test_history_is_committed_along_the_path() -> None:
+    """A bar that counts its steps: each accepted point adds one, trials add none."""
+    m = Model("counter", nodes=1, rule=quadrature.point_rule())
+    ((u,),) = m.nodal_unknowns("u")
+    (t,) = m.parameters(t="load factor")
+    (n,) = m.point_data(n="points so far")
+    m.weak_form([(u + u**3 - t, u)])
+    m.fields(count=n)
+    m.history(n=n + 1)
+    study = Study(Mesh.line(1.0, cells=1))
+    study.add("counter", m.finish(), on=lambda x: x[:, 0] == 0.0, t=lambda t: t)
+    path = study.follow(step=0.2, until=lambda r: r.t > 1.0)
+    last = path.results[-1]
+    assert last.histories["counter"][0, 0, 0] == len(path.results)
+
+
+# --- Bifurcations of paths: found, located, and followed to the other branch ----------------------
+
+
+K = 3.0
+
+
+@cache
+def rigid_link() -> Definition:
+    """A rigid link of length 1 on a torsional spring, pressed along its axis by P."""
+    m = Model("link", nodes=1, rule=quadrature.point_rule())
+    ((q,),) = m.nodal_unknowns("q")
+    k, P = m.parameters(k="stiffness", P="force")
+    m.potential(k / 2 * q**2 - P * (1 - sp.cos(q)))
+    return m.finish()
+
+
+def column() -> Study:
+    study = Study(Mesh.line(1.0, cells=1))
+    study.add("link", rigid_link(), on=lambda x: x[:, 0] == 0.0, k=K, P=lambda t: t)
+    return study
+
+
+def far(result: Any) -> bool:
+    return bool(abs(result.values("q")[0]) > 1.0)
+
+
+def test_a_link_buckles_to_both_sides() -> None:
+    """P = k q / sin q on the other branch."""
+    study = column()
+    straight = study.follow(step=0.7, until=lambda r: r.t > 5.0, detect="bifurcation")
+    (found,) = straight.bifurcations
+    assert found.located
+    assert found.directions == 1
+    assert found.t == pytest.approx(K, rel=1e-9)
+    for start, side in ((found, 1.0), (found.reversed, -1.0)):
+        path = study.follow(start=start, step=0.1, until=far)
+        q = np.array([r.values("q")[0] for r in path.results[1:]])
+        t = np.array([r.t for r in path.results[1:]])
+        assert (q * side > 0.0).all()
+        np.testing.assert_allclose(t, K * q / np.sin(q), rtol=1e-9)
+        assert path.results[-1].unstable == 0
+    assert straight.results[-1].unstable == 1
+
+
+def resting() -> Study:
+    """A block that lies on another one, which nothing else holds."""
+    lower = Mesh.rectangle(1, 1, cells=(2, 2))
+    study = Study(Mesh.union(lower=lower, upper=lower.map(lambda x: np.add(x, [0, 1]))))
+    study.add("body", elastic, mu=1.0, K=5.0)
+    study.contact("upper:bottom", "lower:top", friction=0.3)
+    study.fix("lower:bottom", u_x=0, u_y=0)
+    study.load("upper:top", u_y=-0.05)
+    return study
+
+
+def test_a_path_that_cannot_see_bifurcations_says_so() -> None:
+    with pytest.warns(MissedBifurcations, match="no symmetric, regular tangent at load factor"):
+        path = resting().follow(step=0.5, until=lambda r: r.t > 1.0, detect="bifurcation")
+    assert path.results[-1].unstable is None
+
+
+def test_a_limit_point_is_no_bifurcation() -> None:
+    path = shallow().follow(
+        step=0.01, until=lambda r: r.values("w")[0] > 0.42, detect="bifurcation"
+    )
+    assert len(path.limits) == 2
+    assert path.bifurcations == ()
+    assert {r.unstable for r in path.results} == {0, 1}
+
+
+def test_a_column_becomes_an_elastica() -> None:
+    """Euler's curve, by elliptic integrals of half the angle at the end."""
+    length, height, young = 100.0, 1.0, 2000.0
+    study = Study(Mesh.rectangle(length, height, cells=(25, 1), order=2))
+    study.add("body", rubber, mu=young / 2, lame=0.0)
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_x=-1.0 / height)
+    euler = np.pi**2 * young * height**3 / 12 / (4 * length**2)
+    straight = study.follow(
+        step=0.3 * euler, until=lambda r: r.t > 1.5 * euler, detect="bifurcation"
+    )
+    (found,) = straight.bifurcations
+    assert found.t == pytest.approx(euler, rel=1e-3)
+    tip = (length, height / 2)
+    path = study.follow(start=found, step=0.05, until=lambda r: abs(r.at(tip)["u_y"]) > 60.0)
+    assert len(path.results) > 5
+    for result in path.results[1:]:
+        angle = turned(result, length, height)
+        k = np.sin(angle / 2)
+        load = (2 * ellipk(k**2) / np.pi) ** 2 * euler
+        assert result.t == pytest.approx(load, rel=3e-3)
+        assert abs(result.at(tip)["u_y"]) == pytest.approx(2 * k / ellipk(k**2) * length, rel=5e-3)
+        shortened = length * (2 - 2 * ellipe(k**2) / ellipk(k**2))
+        assert -result.at(tip)["u_x"] == pytest.approx(shortened, rel=1e-2, abs=5e-3)
+    assert path.results[-1].unstable == 0
+
+
+def turned(result: Any, length: float, height: float) -> float:
+    """Angle of the section at the end."""
+    top, bottom = (result.at((length, y)) for y in (height, 0.0))
+    return float(np.arcsin(abs(top["u_x"] - bottom["u_x"]) / height))
+
+
+def test_bifurcations_that_are_refused() -> None:
+    study = column()
+    with pytest.raises(StudyError, match=r"detect = 'bifurcations': allowed are"):
+        study.follow(step=0.5, until=lambda r: True, detect="bifurcations")  # type: ignore[arg-type]
+
+
+def test_what_is_nearly_singular_is_looked_for_with_contact() -> None:
+    result = resting().solve()
+    sought = result.system.problem(result.system.quasi_static_step(1.0, result.x, {}))
+    found = critical_point(sought, 1.0, result.x)
+    assert abs(found.value) > 1e-3  # without contact the block is free
+    assert found.value == pytest.approx(critical_point(sought.at(result.x), 1.0, result.x).value)
