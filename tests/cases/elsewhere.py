@@ -4,7 +4,9 @@ import os
 import time
 from pathlib import Path
 
+from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.process_pool import processes
+from softehl.runtime.solve.solution import Status
 
 
 def double(value: int) -> int:
@@ -27,6 +29,13 @@ def tell_and_wait(target: Path) -> None:
     part.write_text(str(os.getpid()))
     part.rename(target)
     time.sleep(60.0)
+
+
+def tell_and_end(number: int, observer: Observer) -> Outcome[int]:
+    """500 stages, then the number."""
+    for count in range(500):
+        observer.stage(str(count))
+    return Outcome((number,), Status.CONVERGED, "")
 
 
 def fail(error: Exception) -> None:

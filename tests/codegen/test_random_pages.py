@@ -525,7 +525,6 @@ WIDE_PAGES = 200
 STATES = 6
 HUGE = 1e150
 """No value above: its square is still a double."""
-EPSILON = 2.0**-52
 
 
 def wide_recipes(count: int) -> list[Recipe]:

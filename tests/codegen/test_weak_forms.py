@@ -13,7 +13,6 @@ import sympy as sp
 import softehl
 from softehl.codegen import pipeline
 from softehl.codegen.elements import quadrature, shapes
-from softehl.codegen.language import kinematics as kin
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.fields import Fields
@@ -295,34 +294,6 @@ def test_a_guarded_division_by_zero_at_a_point_of_the_rule() -> None:
 
 
 # --- Elements with any number of coordinate components: bar, triangle, hexahedron -----------------
-
-
-def hexahedron() -> Definition:
-    """8-node neo-Hookean solid."""
-    m = Model("hexahedron", nodes=8, rule=quadrature.gauss(2, 3))
-    X = m.coordinates("X", "Y", "Z")
-    u = m.nodal_unknowns("u", "v", "w")
-    mu, kappa = m.parameters(mu="shear modulus [MPa]", kappa="bulk modulus [MPa]")
-    e = kin.isoparametric(m, X, shapes.hex8_gradient(*m.point()))
-    F = kin.deformation_gradient(m, e.dN, u)
-    J = m.define("J", F.det())
-    W = mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + kappa / 2 * (J - 1) ** 2
-    m.potential(m.integral("Pi", W * e.detJ))
-    m.fields(J=J)
-    return m.finish()
-
-
-def bar() -> Definition:
-    """2-node bar in one dimension: potential k/2 (u_2 - u_1)^2 / (X_2 - X_1)."""
-    m = Model("bar", nodes=2, rule=quadrature.gauss(1, 1))
-    X = m.coordinates("X")
-    u = m.nodal_unknowns("u")
-    (k,) = m.parameters(k="stiffness [N]")
-    (xi,) = m.point()
-    e = kin.isoparametric(m, X, [(sp.diff(n, xi),) for n in shapes.line2(xi)])
-    strain = kin.deformation_gradient(m, e.dN, u)[0, 0] - 1
-    m.potential(m.integral("Pi", k / 2 * strain**2 * e.detJ))
-    return m.finish()
 
 
 def test_shape_functions_of_the_hexahedron() -> None:

@@ -8,7 +8,6 @@ from softehl.runtime.discretisation.quadrature import (
     facet_rule,
     film_rule,
     gauss,
-    lagrange,
     lobatto,
     pressure_nodes,
     trace_rule,
@@ -49,14 +48,6 @@ def test_shape_functions_reproduce_polynomials_and_their_slopes(m_p: int, kind: 
     x = rule.points[:, 0]
     assert rule.basis[:, :, 0] @ nodal == pytest.approx(polynomial(x), abs=1e-13)
     assert rule.basis[:, :, 1] @ nodal == pytest.approx(polynomial.deriv()(x), abs=1e-12)
-
-
-@pytest.mark.parametrize("m_p", range(1, 8))
-def test_shape_functions_are_one_at_their_own_node(m_p: int) -> None:
-    nodes = pressure_nodes(m_p)
-    assert nodes[0] == -1.0
-    assert np.all(np.diff(nodes) > 0)
-    assert lagrange(nodes, nodes)[:, :, 0] == pytest.approx(np.eye(m_p + 1), abs=1e-14)
 
 
 @pytest.mark.parametrize("m_p", range(1, 6))

@@ -508,9 +508,9 @@ def test_numbers_of_numpy_and_sympy_are_numbers() -> None:
             r"given float64 of shape \(2,\); x has all places, \(9, 2\), in columns: x\[:, 0\]",
         ),
         (
-            lambda s: Mesh.rectangle(1, 1, cells=(2.0, 2)),
+            lambda s: Mesh.rectangle(1, 1, cells=(2.0, 2)),  # type: ignore[arg-type]
             "2 whole numbers of at least 1",
-        ),  # type: ignore[arg-type]
+        ),
         (lambda s: Mesh(np.array(SQUARE), [("quad4", [])]), "by their kinds, {"),  # type: ignore[arg-type]
         (
             lambda s: Mesh(np.array(SQUARE), {"quad4": np.array([[1, 2, 3, 4]])}),
