@@ -11,7 +11,7 @@ from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.material_response import at_one_point
 from softehl.codegen.hosts.registry import Host
-from softehl.codegen.hosts.test_states import Sample, samples
+from softehl.codegen.hosts.test_states import Sample, renewed, samples
 from softehl.codegen.verify.kernel_batch import parameters_of
 
 LIMIT = 1e-11
@@ -39,7 +39,7 @@ def _files(interface: ElementInterface, states: Sequence[State], suffix: str) ->
     texts, kernel = c_interface.files(interface)
     references = samples(interface, kernel, states)
     substitutions = {"name": interface.name, "suffix": suffix, "flags": FLAGS, **_language(suffix)}
-    texts["samples.h"] = sample_table(references)
+    texts["samples.h"] = sample_table(interface, references)
     texts[f"test.{suffix}"] = test(interface)
     texts[f"example.{suffix}"] = example(interface, references[0], suffix)
     texts["Makefile"] = c_interface.filled(c_interface.template("c.mk"), substitutions)
@@ -60,9 +60,9 @@ def _functions(interface: ElementInterface) -> str:
     return ", ".join(f"`{interface.name}_{t}`" for t in interface.tasks)
 
 
-def sample_table(references: Sequence[Sample]) -> str:
+def sample_table(interface: ElementInterface, references: Sequence[Sample]) -> str:
     """samples.h: the states and their values, those of the points last."""
-    arrays = sample_arrays(references)
+    arrays = sample_arrays(interface, references)
     tables = [
         c_interface.table(f"sample_{name}", [float(v) for row in rows for v in row])
         for name, rows in arrays.items()
@@ -72,8 +72,11 @@ def sample_table(references: Sequence[Sample]) -> str:
     return "\n".join([head, f"enum {{ SAMPLES = {len(references)} }};\n", *tables])
 
 
-def sample_arrays(references: Sequence[Sample]) -> dict[str, list[Sequence[Any]]]:
+def sample_arrays(
+    interface: ElementInterface, references: Sequence[Sample]
+) -> dict[str, list[Sequence[Any]]]:
     """Rows of each array of the states and their values."""
+    commits = c_interface.commits(interface)
     return {
         "X": [s.state.coordinates for s in references],
         "u": [s.state.dofs for s in references],
@@ -83,6 +86,7 @@ def sample_arrays(references: Sequence[Sample]) -> dict[str, list[Sequence[Any]]
         "residual": [s.residual for s in references],
         "tangent": [s.tangent for s in references],
         "fields": [s.fields for s in references],
+        "renewed": [[*s.state.data, *renewed(interface, s)] for s in references if commits],
     }
 
 
@@ -93,6 +97,9 @@ def test(interface: ElementInterface) -> str:
         if task in _CHECKS:
             checks.append(_CHECKS[task])
             calls.append(f"    check_{task}();\n")
+    if c_interface.commits(interface):
+        checks.append(_COMMIT)
+        calls.append("    check_commit();\n")
     for value, slope in ((Task.ENERGY, Task.RESIDUAL), (Task.RESIDUAL, Task.TANGENT)):
         comparable = {value, slope} <= set(interface.tasks) and not interface.definition.prescribed
         if comparable:
@@ -141,6 +148,16 @@ _CHECKS: dict[str, str] = {
 }
 """,
 }
+_COMMIT = """static void check_commit(void)
+{
+    double *found = (double *)numbers(N * FIELDS);
+    @name@_fields(N, X, u, data, sample_p, found);
+    @name@_commit(N, found, data);
+    say("history", off(data, sample_renewed, DATA, N), @limit@);
+    spread(data, sample_data, DATA);
+    free(found);
+}
+"""
 _DIFFERENCES: dict[str, str] = {
     Task.RESIDUAL: """static void check_residual_by_differences(void)
 {

@@ -14,7 +14,7 @@ from softehl.codegen.abi import TargetError, Task
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts.c_library import sample_arrays
 from softehl.codegen.hosts.element_interface import ElementInterface
-from softehl.codegen.hosts.test_states import Sample, renewed
+from softehl.codegen.hosts.test_states import Sample
 
 LETTERS = 63
 """Longest name of Fortran 2018 and of MATLAB."""
@@ -69,14 +69,12 @@ def direction(interface: ElementInterface, task: str) -> list[Array]:
 def sample_text(interface: ElementInterface, references: Sequence[Sample]) -> str:
     """values.txt: their number, then each array with all states; the tangent by columns."""
     size = len(interface.definition.unknowns)
-    arrays = sample_arrays(references)
+    arrays = sample_arrays(interface, references)
     arrays["tangent"] = [
         [row[size * i + j] for j in range(size) for i in range(size)]
         for row in arrays["tangent"]
         if row
     ]
-    if c_interface.commits(interface):
-        arrays["renewed"] = [[*s.state.data, *renewed(interface, s)] for s in references]
     lines = [str(len(references))]
     lines += [" ".join(repr(float(v)) for row in rows for v in row) for rows in arrays.values()]
     return "\n".join(line for line in lines if line) + "\n"

@@ -185,6 +185,7 @@ def test_large_strains_need_nlgeom(usermat: ctypes.CDLL) -> None:
     assert ended.value == before + 1
 
 
+@pytest.mark.slow
 def test_the_deck_has_what_the_law_needs(tmp_path: Path) -> None:
     deck = (folder(j2, "ansys", tmp_path) / "j2.dat").read_text()
     assert "TB,USER,1,1,4\n! give your values: G, K, sy, H\nTBDATA,1,80.0,170.0,0.5,10.0" in deck

@@ -86,7 +86,12 @@ def test_a_patch_with_plastic_flow_is_that_of_a_study(tmp_path: Path) -> None:
     ("name", "old", "new"),
     [
         ("random_line2.f90", "transpose(tangent(:, :, e))", "tangent(:, :, e)"),
-        ("random_line2.c", "state[0] = fields[1]", "state[0] = fields[0]"),
+        pytest.param(
+            "random_line2.c",
+            "state[0] = fields[1]",
+            "state[0] = fields[0]",
+            marks=pytest.mark.slow,
+        ),
         pytest.param("element.f90", "pnewdt = 0.25d0", "pnewdt = 1", marks=pytest.mark.slow),
     ],
 )
