@@ -8,7 +8,7 @@ from pathlib import Path
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import BuildError, Target
-from softehl.codegen.elements import cell_table
+from softehl.codegen.elements import cells
 from softehl.codegen.hosts import registry
 from softehl.codegen.language.material import Law
 from softehl.codegen.language.weak_form import DEFAULT_CELL, CellOptions
@@ -133,7 +133,7 @@ def _generate(
 
 def _regenerate(check: bool) -> int:
     files = output_files.files(pipeline.compile_model(make()) for make in ALL.values())
-    files[cell_table.NAME] = cell_table.cell_table()
+    files[cells.CELL_TABLE] = cells.cell_table()
     stale = [name for name, text in files.items() if _differs(GENERATED / name, text)]
     expected = {*files, "__init__.py"}
     unexpected = [p.name for p in GENERATED.glob("*.[chj]*") if p.name not in expected]

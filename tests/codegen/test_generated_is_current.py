@@ -23,10 +23,10 @@ import hashlib
 from softehl.codegen import pipeline
 assert pipeline.__file__.startswith({directory!r}), pipeline.__file__
 from softehl.codegen.models import ALL
-from softehl.codegen.elements import cell_table
+from softehl.codegen.elements import cells
 from softehl.codegen.tools import output_files
 files = output_files.files(pipeline.compile_model(make()) for make in ALL.values())
-files[cell_table.NAME] = cell_table.cell_table()
+files[cells.CELL_TABLE] = cells.cell_table()
 for name, text in files.items():
     print(name, hashlib.sha256(text.encode()).hexdigest())
 """

@@ -29,7 +29,6 @@ from softehl.codegen.emit.points import (
     cell_constants,
     parent_map,
     point_function,
-    sum_factored_btab,
 )
 from softehl.codegen.emit.points.btab import STEM, Pair, Parent, pull_back, ranks
 from softehl.codegen.emit.points.c_lines import Lines, load, store
@@ -252,7 +251,8 @@ def _body(layout: Layout, outputs: PointOutputs) -> str:
     for pair in pairs:
         if pair.entries:
             lines = [layout.shape(order).line for order in pair.order]
-            (sum_factored_btab if all(lines) else btab).assemble(out, pair)
+            assemble = btab.assemble_by_directions if all(lines) else btab.assemble
+            assemble(out, pair)
     size, values = len(layout.d.unknowns), len(parent.of_centroid)
     if values:
         out.open(f"for (int i = 0; i < {size}; ++i)")
