@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from softehl import Mesh, Study
 from tests.library.benchmark import Benchmark
@@ -31,5 +33,127 @@ BENCHMARKS.append(
         1e-9,
         "closed form",
         lambda: uniaxial("hencky", 2.0, mu=1 / 2.6, kappa=1 / 1.2),
+    )
+)
+
+
+def stress_path(
+    material: str, strains: Sequence[float], *, dt: float = 1.0, **parameters: Any
+) -> list[float]:
+    """Axial stresses [MPa] of a bar, free at its sides, at given axial strains, one a step."""
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
+    study.add("bar", material=material, **parameters)
+    study.fix("left", u_x=0)
+    study.fix((0.0, 0.0, 0.0), u_y=0, u_z=0)
+    study.fix((0.0, 1.0, 0.0), u_z=0)
+    times = dt * np.arange(len(strains) + 1)
+    study.fix("right", u_x=lambda x, t: np.interp(t, times, [0.0, *strains]))
+    until = dt * len(strains)
+    return [r.reaction("right")["u_x"] for r in study.march(dt=dt, until=until, method="euler")]
+
+
+def hardening_line() -> float:
+    """Stress after tension to 2 % and back to 1 %."""
+    strains = [0.001, 0.005, 0.01, 0.02, 0.019, 0.015, 0.01]
+    return stress_path("j2", strains, E=2e5, nu=0.3, sy=250.0, H=500.0, H_kin=1000.0)[-1]
+
+
+def _hardening_line() -> float:
+    E, sy, H, Hk = 2e5, 250.0, 500.0, 1000.0
+    p = (E * 0.02 - sy) / (E + H + Hk)  # after tension
+    # reverse flow: E (e - q) - Hk q = -(sy + H (p + (p - q)))
+    q = (E * 0.01 + sy + 2 * H * p) / (E + Hk + H)
+    return E * (0.01 - q)
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "j2",
+        "tension to 2 % and back to 1 %, mixed hardening: stress [MPa]",
+        _hardening_line(),
+        1e-9,
+        "closed form",
+        hardening_line,
+    )
+)
+
+
+def necking_free() -> float:
+    """Kirchhoff stress at a stretch of 1.2."""
+    data = {"E": 2e5, "nu": 0.3, "sy": 250.0, "Q": 200.0, "b": 10.0, "H": 100.0}
+    return uniaxial("hencky_j2", 1.2, steps=10, **data) * 1.2
+
+
+def _necking_free() -> float:
+    E, sy, Q, b, H = 2e5, 250.0, 200.0, 10.0, 100.0
+    p = brentq(
+        lambda p: E * (np.log(1.2) - p) - (sy + Q * (1 - np.exp(-b * p)) + H * p), 0, 1, xtol=1e-16
+    )
+    return float(E * (np.log(1.2) - p))
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "hencky_j2",
+        "tension to 1.2 times the length: Kirchhoff stress [MPa]",
+        _necking_free(),
+        1e-8,
+        "closed form",
+        necking_free,
+    )
+)
+
+
+def creep() -> float:
+    """Strain after 100 s at 100 MPa, which is there from the start."""
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
+    study.add("bar", material="norton", E=1e5, nu=0.3, A=1e-12, n=4.0)
+    study.fix("left", u_x=0)
+    study.fix((0.0, 0.0, 0.0), u_y=0, u_z=0)
+    study.fix((0.0, 1.0, 0.0), u_z=0)
+    study.load("right", u_x=lambda x, t: 100.0)
+    *_, last = study.march(dt=10.0, until=100.0, method="euler")
+    return float(last.at((1, 0, 0))["u_x"])
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "norton",
+        "100 s at 100 MPa, A = 1e-12, n = 4: strain",
+        100.0 / 1e5 + 1e-12 * 100.0**4 * 100.0,
+        1e-8,
+        "closed form",
+        creep,
+    )
+)
+
+CYCLIC = {"E": 2e5, "nu": 0.3, "sy": 200.0, "C1": 5e4, "g1": 400.0}
+
+
+def saturated_cycle() -> float:
+    """Largest stress of the fifth cycle between -1 and 1 %."""
+    ramp = np.linspace(0, 1, 101)[1:]
+    cycle = np.concatenate([1 - 2 * ramp, 2 * ramp - 1])
+    strains = 0.01 * np.concatenate([ramp, *[cycle] * 4])
+    data = {**CYCLIC, "Q": 0.0, "b": 0.0, "C2": 0.0, "g2": 0.0}
+    return max(stress_path("chaboche", strains, **data)[-100:])
+
+
+def _saturated_cycle() -> float:
+    E, sy, C, g = (CYCLIC[k] for k in ("E", "sy", "C1", "g1"))
+    return float(
+        brentq(lambda s: s - sy - C / g * np.tanh(g * (0.02 - 2 * s / E) / 2), sy, 1e3, xtol=1e-12)
+    )
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "chaboche",
+        "cycles between -1 and 1 %, 100 steps a half: amplitude [MPa], sy + C / g tanh(g dep / 2)",
+        _saturated_cycle(),
+        2e-3,
+        "Lemaitre and Chaboche (1990), closed form",
+        saturated_cycle,
+        slow=True,
     )
 )
