@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.candidate import Candidate
 from benchmarks.deriving import run_limited
-from softehl.codegen.tools.build import compiler
+from softehl.codegen.c_compiler import compiler
 
 COMMON_FLAGS = ("-O3", "-march=native", "-ffast-math")
 """What everybody is compiled with first."""

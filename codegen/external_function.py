@@ -35,8 +35,6 @@ STEP = 1e-100
 """Imaginary step: its square is below the rounding of any number."""
 PLACES = 8
 """Places at which derivatives are compared with differences."""
-LOWEST_ADDRESS = 4096
-"""No function lies below; a kernel that is called without a function has no value."""
 
 
 class ExternalFunctionError(BuildError, ValueError):
@@ -48,7 +46,8 @@ class ExternalFunction:
     """A C function.
 
     name: in C. derivatives: orders that it returns. text: its source; empty where its address is
-    given when the kernel is called. file: name of the source, for messages.
+    given when the kernel is called. file: name of the source, for messages. address: of a
+    function without text that the page knows itself.
     """
 
     name: str
@@ -57,6 +56,7 @@ class ExternalFunction:
     derivatives: int
     text: str = ""
     file: str = field(default="", compare=False)
+    address: int = field(default=0, compare=False)
 
     @cached_property
     def is_complex(self) -> bool:
@@ -162,7 +162,7 @@ class ExternalFunction:
     def values(self, x: Sequence[float], order: int = 0) -> list[float] | None:
         """Results at real numbers; None where there are none."""
         if not self.text:
-            return None
+            return _called_at(self, x, order) if self.address else None
         size = self.results(order)
         result = (ctypes.c_double * size)(*[math.nan] * size)
         failed = _library(self)(order, (ctypes.c_double * self.inputs)(*x), result)
@@ -176,7 +176,7 @@ class ExternalFunction:
         Its derivatives up to `orders` are those of the function. number: of a double. None where
         there is no value.
         """
-        bases = _bases(self)
+        bases = _bases(self, self.address)
         place = next((b for b in bases if _is_near(b[0], x)), None)
         if place is None:
             at = [float(v) for v in x]
@@ -212,7 +212,7 @@ class ExternalFunction:
 
         Raises ExternalFunctionError.
         """
-        for x, _ in list(_bases(self))[:PLACES]:
+        for x, _ in list(_bases(self, self.address))[:PLACES]:
             for label, meaning, computed, difference in _comparisons(self, x):
                 where = ", ".join(f"{v:.6g}" for v in x)
                 raise ExternalFunctionError(
@@ -236,13 +236,28 @@ _Place = tuple[list[float], list[float]]
 
 
 @cache
-def _bases(_: ExternalFunction) -> deque[_Place]:
+def _bases(_: ExternalFunction, address: int) -> deque[_Place]:
     """Places of the last polynomials: a small step must not change to another one."""
     return deque(maxlen=64)
 
 
 def _is_near(at: Sequence[float], x: Sequence[Any]) -> bool:
     return all(abs(float(v) - a) <= 1e-13 * abs(a) for v, a in zip(x, at, strict=True))
+
+
+def _called_at(f: ExternalFunction, x: Sequence[float], order: int) -> list[float] | None:
+    """Results of a function that is known by its address alone."""
+    pointer = ctypes.POINTER(ctypes.c_double)
+    function = ctypes.CFUNCTYPE(ctypes.c_int, *[pointer] * 4)(f.address)
+    m, n = f.inputs, f.outputs
+    y, dy, ddy = ((ctypes.c_double * k)(*[math.nan] * k) for k in (n, n * m, n * m * m))
+    first = dy if f.derivatives > 0 and order > 0 else None
+    second = ddy if f.derivatives > 1 and order > 1 else None
+    if function((ctypes.c_double * m)(*x), y, first, second):
+        return None
+    pairs = [(i, j) for i in range(m) for j in range(i, m)]
+    upper_entries = [ddy[(k * m + i) * m + j] for k in range(n) for i, j in pairs]
+    return [*y, *dy, *upper_entries][: f.results(order)]
 
 
 @cache

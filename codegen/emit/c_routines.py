@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterable, Sequence
 from softehl.codegen.emit import array_routines, tensor_routines, term_loops
 from softehl.codegen.emit.c_printer import Printer, array_arguments, array_operands, number
 from softehl.codegen.emit.code_motion import schedule
-from softehl.codegen.external_function import LOWEST_ADDRESS
 from softehl.codegen.graph.divided_difference import Quotient, SecondQuotient
 from softehl.codegen.graph.graph import Graph, Node, Op, Routine
 from softehl.codegen.graph.routines import (
@@ -32,6 +31,7 @@ from softehl.codegen.graph.term_reductions import Reduction
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
+from softehl.function_address import LOWEST_ADDRESS
 
 _CLOSE = {
     Op.LOG: """    const double z = d / v;

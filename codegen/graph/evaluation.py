@@ -394,7 +394,7 @@ class Walk:
 
     def _reduced(self, r: Reduction, operands: Vector, q: int) -> Vector:
         rates = self.state.array_rates or [()] * len(self.state.arrays)
-        arrays = []
+        arrays: list[tuple[Vector, Vector]] = []
         for k in r.arrays:
             if k < 0:
                 arrays.append((exact(self.state.term_history[q][-1 - k]), []))

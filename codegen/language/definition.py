@@ -12,6 +12,7 @@ from softehl.codegen.graph.routines import external_functions
 from softehl.codegen.graph.run_time_arrays import RunTimeArray
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.sympy_tape import SympyTape
+from softehl.function_address import FunctionAddress
 
 
 @dataclass(frozen=True)
@@ -164,6 +165,8 @@ class Definition:
         Unknowns of one element alone.
     functions : tuple of str
         Parameters that are addresses of C functions.
+    addresses : tuple
+        Name and address of those that the page knows itself.
     point_rates : bool
         Whether point data have rates.
     cell : str
@@ -222,6 +225,8 @@ class Definition:
     """Unknowns of one element alone, which a study condenses."""
     functions: tuple[str, ...] = ()
     """Parameters that are addresses of C functions."""
+    addresses: tuple[tuple[str, FunctionAddress], ...] = field(default=(), compare=False)
+    """Those that the page knows itself."""
     point_rates: bool = False
     """Whether the second half of the point data says how the first moves along a variation."""
     cell: str = ""

@@ -16,6 +16,7 @@ from softehl.codegen.graph.routines import external
 from softehl.codegen.language.errors import ModelError, page_line
 from softehl.codegen.language.flatten import CheckedList, Entries, Matrix
 from softehl.codegen.language.sympy_lowering import Symbols
+from softehl.function_address import FunctionAddress, FunctionAddressError, address_of
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*"([^"\n]+)"[^\n]*$', flags=re.MULTILINE)
@@ -29,6 +30,12 @@ class Prototype:
     outputs: Any
     derivatives: int | None
     source: Any
+    address: FunctionAddress | None = None
+
+    @property
+    def has_text(self) -> bool:
+        """True where the function is known by its C."""
+        return self.source is not None and self.address is None
 
     def record(self, name: str, inputs: int) -> ExternalFunction:
         """The function, checked.  Raises ModelError."""
@@ -39,14 +46,15 @@ class Prototype:
                 f"{name}: give the inputs as a list, m.external({name!r}, [e, d], ...)"
             )
         text, file = "", self.function
-        if self.source is not None:
+        at = int(self.address or 0)
+        if self.has_text:
             text, file = _source(name, self.source)
             if not re.search(rf"\b{self.function}\s*\(", text):
                 raise ModelError(
                     f"{name}: {file} has no function {self.function}; its name in C is given by "
                     f"function=..."
                 )
-        f = ExternalFunction(self.function, inputs, _count(name, self.outputs), 0, text, file)
+        f = ExternalFunction(self.function, inputs, _count(name, self.outputs), 0, text, file, at)
         order = self.derivatives
         if order is None:
             order = 0 if f.is_complex else 1
@@ -55,7 +63,7 @@ class Prototype:
                 f"{name}: derivatives = {order!r}, must be 0, 1 or 2: the orders that "
                 f"{self.function} returns"
             )
-        return ExternalFunction(f.name, inputs, f.outputs, order, text, file)
+        return ExternalFunction(f.name, inputs, f.outputs, order, text, file, at)
 
 
 def _count(name: str, outputs: Any) -> int:
@@ -69,13 +77,21 @@ def _count(name: str, outputs: Any) -> int:
     return shape[0] * shape[-1] if len(shape) == 2 else int(shape[0])
 
 
+def given_address(name: str, source: Any) -> FunctionAddress | None:
+    """Address of a function that a page knows itself.  Raises ModelError."""
+    if source is None or isinstance(source, (str, Path)):
+        return None
+    try:
+        return address_of(name, source)
+    except FunctionAddressError:
+        raise ModelError(
+            f"{name}: source = {source!r}: give a C file, its text, or a function of ctypes, cffi "
+            "or Numba"
+        ) from None
+
+
 def _source(name: str, source: Any) -> tuple[str, str]:
     """Text of a C file, or the text itself, with the files beside it that it includes."""
-    if not isinstance(source, (str, Path)):
-        raise ModelError(
-            f"{name}: source = {source!r}: give a C file or its text; the address of a function "
-            f"goes to Study.add({name}=...), and m.external has no source then"
-        )
     if isinstance(source, str) and ("\n" in source or "{" in source):
         return source, f"the source of {name}"
     file = page_line().rpartition(":")[0]

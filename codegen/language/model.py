@@ -462,9 +462,9 @@ class Model(ModelBuilder):
             Arguments x of the function, row by row where they are matrices.
         outputs : int or tuple of int
             Number of values y; 1 gives a scalar, (3, 3) a matrix.
-        source : str or Path, optional
-            C file beside the page, or its text. Left out: the address of the function is given to
-            `Study.add(name=...)`, as of ctypes, cffi or Numba.
+        source : str, Path or function, optional
+            C file beside the page, or its text; or a function of ctypes, cffi or Numba of this
+            process. Left out: such a function is given to `Study.add(name=...)`.
         derivatives : int, optional
             Highest order of derivatives that the function returns, 0, 1 or 2; 1 if left out, 0 for
             a function of `double complex`.
@@ -489,8 +489,9 @@ class Model(ModelBuilder):
         derivatives of the next order follow by complex steps. Threads call it at the same time.
         """
         what = function or name
-        address = [] if source is not None else [self._address(what)]
-        prototype = external_functions.Prototype(what, outputs, derivatives, source)
+        at = external_functions.given_address(name, source)
+        prototype = external_functions.Prototype(what, outputs, derivatives, source, at)
+        address = [] if prototype.has_text else [self._address(what, at)]
         return external_functions.external_values(self._symbols, name, inputs, prototype, address)
 
     def table(

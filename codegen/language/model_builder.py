@@ -30,6 +30,7 @@ from softehl.codegen.language.flatten import CheckedList, Entries, Matrix
 from softehl.codegen.language.sympy_lowering import Symbols
 from softehl.codegen.language.sympy_tape import Integral
 from softehl.codegen.language.tensor_functions import TensorFunctions
+from softehl.function_address import FunctionAddress
 
 _TIMES = (
     ("rate", "coefficient of the time derivative [1/s]"),
@@ -157,7 +158,7 @@ class Arguments:
 
     def point_array(self, record: TermHistory, *, varying: bool) -> tuple[int, sp.Symbol]:
         """Number of a history with one number for each term, and the amount of its variation."""
-        taken = [a.name for a in (*self.arrays, *self.term_history)]
+        taken = [*(a.name for a in self.arrays), *(h.name for h in self.term_history)]
         if record.name in taken:
             raise ModelError(f"the name {record.name} is used twice for arrays: rename one")
         self.term_history.append(record)
@@ -577,6 +578,7 @@ class ModelBuilder:
         self._equations = Equations(self._symbols)
         self._outputs = Outputs(self._symbols)
         self._functions: dict[str, Node] = {}
+        self._addresses: dict[str, FunctionAddress] = {}
 
     def _foreign(self, rule: QuadratureRule, nodes: int) -> str:
         """Words on a rule of another cell than that of the nodes."""
@@ -634,6 +636,7 @@ class ModelBuilder:
             term_history=tuple(a.term_history),
             term_updates=self._outputs.term_updates(a.term_history),
             functions=tuple(self._functions),
+            addresses=tuple(self._addresses.items()),
             record=self._symbols.record,
             statements=tuple(self._symbols.statements),
         )
@@ -652,8 +655,10 @@ class ModelBuilder:
         used = equations | set(reachable([*(n for _, n in self._outputs.evaluated), *renewed]))
         self._arguments.check_use(equations, used, self._unused)
 
-    def _address(self, function: str) -> Node:
-        """Parameter that is the address of a C function, which calls of it share."""
+    def _address(self, function: str, at: FunctionAddress | None) -> Node:
+        """Parameter that is the address of a C function, which calls of it share; at: its value."""
+        if at is not None and self._addresses.setdefault(function, at) != at:
+            raise ModelError(f"{function} is another C function already: say function=... of one")
         if function not in self._functions:
             (symbol,) = self._arguments.declare("parameters", {function: "address of a C function"})
             self._functions[function] = self._symbols.bound[symbol]

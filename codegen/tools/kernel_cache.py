@@ -250,6 +250,11 @@ def _checked(definitions: Sequence[Definition], files: Mapping[str, str], folder
 
 def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str, float]]:
     """Every generated file, and seconds by kernel (empty if they were remembered)."""
+    from softehl.codegen.verify.random_states import check_external_functions
+
+    for d in definitions:
+        if d.addresses:  # a function of this process, which no digest knows
+            check_external_functions(d)
     key = store.digest(["models", generator(), *(fingerprint(d) for d in definitions)])
     files = store.recall(key)
     if files is not None:
@@ -257,7 +262,6 @@ def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str,
     from softehl.codegen import pipeline
     from softehl.codegen.graph.partial_derivatives import DifferentiationError
     from softehl.codegen.tools import output_files
-    from softehl.codegen.verify.random_states import check_external_functions
 
     kernels, seconds = [], {}
     for d in definitions:

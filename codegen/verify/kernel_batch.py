@@ -6,6 +6,7 @@ import ctypes
 import math
 import random
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from softehl.codegen import abi
@@ -24,6 +25,7 @@ class Batch:
     def __init__(
         self, d: Definition, library: Any, states: Sequence[State], along: Sequence[Vector]
     ) -> None:
+        states = [_with_addresses(d, s) for s in states] if d.functions else states
         self.d, self.library, self.states = d, library, states
         first = states[0]
         self.ndof, self.points = len(first.dofs), len(first.rule)
@@ -87,6 +89,16 @@ class Batch:
             return False
         values = self.call(task)[0]
         return any(all(map(math.isnan, v)) for v in (values[:1] if first else values))
+
+
+def _with_addresses(d: Definition, s: State) -> State:
+    """A state with the addresses that the page knows, and nowhere where it knows none."""
+    known = dict(d.addresses)
+    values = [
+        known.get(a.name, 0.0) if a.name in d.functions else v
+        for a, v in zip(d.parameters, s.parameters, strict=True)
+    ]
+    return replace(s, parameters=values)
 
 
 def data_of_element(d: Definition, s: State) -> list[float]:

@@ -115,13 +115,13 @@ def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
 
     unknowns = [*d.unknowns, *(name for name in _fields(d) for _ in range(2))]
     dofs = [vary(example[n]) if n in example else deviation * rng.uniform(-1, 1) for n in unknowns]
-    rule = _rule(d)
+    rule, addresses = _rule(d), dict(d.addresses)
     arrays = [a.layout.sample(rng) for a in d.arrays]
     return State(
         coordinates=_coordinates(d, rng, deviation),
         dofs=dofs,
         data=[about_one(a.name) for a in d.data],
-        parameters=[about_one(a.name) for a in d.parameters],
+        parameters=[addresses.get(a.name) or about_one(a.name) for a in d.parameters],
         rule=rule,
         basis=[_linear(float(p[0]), len(_fields(d))) for p in rule] if d.interpolated else (),
         point_data=[[about_one(a.name) for a in d.point_data] for _ in rule],

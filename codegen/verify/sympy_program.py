@@ -223,11 +223,11 @@ class _Builder:
                     "stretches", self._at(*m.entries), (squares, energy[0]), inner=inner
                 )
             case Terms():
-                entries, (value,) = self._at(*m.entries), self._at(m.value)
+                symbols, (value,) = self._at(*m.entries), self._at(m.value)
                 numbers = tuple(self.record.inputs[a] for a in m.amounts)
-                inner = self._between(entries, (value,))
-                content = (entries, (value,), m.kind, numbers)
-                return self._add("terms", self._at(*m.amounts), content, inner=inner)
+                within = self._between(symbols, (value,))
+                terms = (symbols, (value,), m.kind, numbers)
+                return self._add("terms", self._at(*m.amounts), terms, inner=within)
             case OfArray():
                 number = self.record.inputs[m.amount][1]
                 return self._add("of array", self._at(m.amount, *m.args), (m.layout, number))

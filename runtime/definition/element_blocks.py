@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from softehl.function_address import FunctionAddressError, address_of
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.argument_checks import datum, parameter, require_names
 from softehl.runtime.definition.kernel_loading import KernelOrigin
@@ -22,7 +23,7 @@ from softehl.runtime.definition.problem_definition import (
 from softehl.runtime.discretisation.dofmap import Slot, slots
 from softehl.runtime.kernels.array_data import data_of
 from softehl.runtime.kernels.kernel import Kernel
-from softehl.runtime.kernels.kernel_call import ArgumentError, Rule, address_of
+from softehl.runtime.kernels.kernel_call import Rule
 from softehl.runtime.kernels.run_time_arrays import (
     ArrayData,
     ArrayDataError,
@@ -156,6 +157,7 @@ def page_on(
             raise StudyError(
                 f"{name!r}: {parameter_of_time} comes from the steps in time, it cannot be given"
             )
+    arguments = {**kernel.addresses, **arguments}
     filled = {**previous, **rates, **accelerations}
     needed = [p for p in kernel.parameters if p not in automatic]
     needed += [d for d in kernel.data if d not in filled]
@@ -219,7 +221,7 @@ def parameter_of(kernel: Kernel, block: str, name: str, value: Any) -> Number:
         return parameter(block, name, value)
     try:
         return address_of(f"{block!r}: {name}", value)
-    except ArgumentError as error:
+    except FunctionAddressError as error:
         raise StudyError(str(error)) from None
 
 

@@ -5,15 +5,14 @@ The shapes, orders and units of every array are those of `codegen/abi.py`.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
-import cffi
 import numpy as np
 
+from softehl.function_address import FunctionAddress, FunctionAddressError, address_of
 from softehl.runtime.arrays import Array, frozen
 from softehl.runtime.kernels.array_data import data_of
 from softehl.runtime.kernels.run_time_arrays import (
@@ -31,48 +30,7 @@ class ArgumentError(KernelError, ValueError):
     """An array has a wrong shape or kind, or a task is not offered."""
 
 
-class FunctionAddress(float):
-    """Address of a C function as a parameter of a kernel; `owner` keeps the function alive."""
-
-    owner: object
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """For `pickle`: an address means nothing in another process."""
-        raise TypeError("the address of a C function cannot be pickled: name its source instead")
-
-    def __deepcopy__(self, memo: object) -> FunctionAddress:
-        """Itself."""
-        return self
-
-
-def address_of(name: str, function: Any) -> FunctionAddress:
-    """Return the address of a C function of ctypes, cffi or Numba, or an integer.
-
-    Raises ArgumentError.
-    """
-    if isinstance(function, FunctionAddress):
-        return function
-    number = getattr(function, "address", function)
-    if isinstance(function, _FUNCTION):
-        number = ctypes.cast(function, ctypes.c_void_p).value
-    elif isinstance(function, _ffi.CData):
-        number = int(_ffi.cast("uintptr_t", function))
-    if not isinstance(number, int) or isinstance(number, bool) or number < LOWEST_ADDRESS:
-        raise ArgumentError(
-            f"{name} = {function!r}: give the address of a C function, of ctypes, cffi or Numba, "
-            "or as an integer"
-        )
-    address = FunctionAddress(number)
-    address.owner = function
-    return address
-
-
 _NOTHING = np.empty(0)
-_ffi = cffi.FFI()
-_FUNCTION: type = ctypes.CFUNCTYPE(None).__mro__[1]
-"""Type of the functions of ctypes."""
-LOWEST_ADDRESS = 4096
-"""No function lies below."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +78,9 @@ class Family:
     a mapping by name, rule None for the model's default (the only one when `unrolled`).
     places: of every unknown its name without number, and its node or None. history: point data
     whose new values the last fields are. internal: unknowns of one element alone. functions:
-    parameters that are addresses of C functions. cell: on which a page of fields stands. kept:
-    numbers that products by sum factorisation keep at a point, 0 where the family has none.
+    parameters that are addresses of C functions; addresses: those that the page knows. cell: on
+    which a page of fields stands. kept: numbers that products by sum factorisation keep at a point,
+    0 where the family has none.
     """
 
     name: str
@@ -145,6 +104,7 @@ class Family:
     internal: tuple[str, ...] = ()
     point_rates: bool = False
     functions: tuple[str, ...] = ()
+    addresses: Mapping[str, FunctionAddress] = field(default_factory=dict, compare=False)
     cell: str = ""
     kept: int = 0
     arrays: tuple[RunTimeArray, ...] = ()
@@ -342,13 +302,17 @@ class Call:
                 )
             return np.ascontiguousarray(given, dtype=np.float64)
         needed = [*kernel.parameters, *(a.name for a in kernel.arrays)]
+        given = {**kernel.addresses, **given}
         missing = [p for p in needed if p not in given]
         if missing:
             raise ArgumentError(f"{kernel.name} needs {', '.join(missing)}")
-        ordered = [
-            address_of(p, given[p]) if p in kernel.functions else given[p]
-            for p in kernel.parameters
-        ]
+        try:
+            ordered = [
+                address_of(p, given[p]) if p in kernel.functions else given[p]
+                for p in kernel.parameters
+            ]
+        except FunctionAddressError as error:
+            raise ArgumentError(f"{kernel.name}: {error}") from None
         numbers = self._array("parameters", ordered, (count,))
         return kernel.with_arrays(numbers, given) if kernel.arrays else numbers
 

@@ -4,6 +4,7 @@ The public names are listed here once and imported when they are first used, so 
 solves a case loads no SymPy and `softehl --help` loads nothing at all.
 """
 
+import dataclasses
 import importlib
 import os
 from collections.abc import Iterator
@@ -448,7 +449,12 @@ def load_kernel(
     place = Path(source) if isinstance(source, str) else source
     with with_sympy():
         folder = kernel_cache.folder_of(place, where, derivatives=derivatives)
-    return kernel.kernel_in(folder, name, cell)
+        loaded = kernel.kernel_in(folder, name, cell)
+        if not loaded.functions:
+            return loaded
+        definition = kernel_cache.definition_of(folder, loaded.name)
+        known = dict(definition.addresses if definition else ())
+        return dataclasses.replace(loaded, addresses=known)
 
 
 from softehl.runtime.definition import page_loader  # noqa: E402, after __path__ is complete

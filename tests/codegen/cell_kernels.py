@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl.codegen import pipeline
+from softehl.codegen import c_compiler, pipeline
 from softehl.codegen.abi import Target, function_name
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import build, output_files
@@ -51,7 +51,15 @@ def cell_kernels(d: Definition, directory: Path, flags: Sequence[str] = ("-O1",)
     files = output_files.ufcx_files([pipeline.compile_model(d, Target.UFCX)])
     source.write_text(files[source.name], encoding="utf-8")
     library = source.with_suffix(".so")
-    command = [*build.compiler(), *build.FLAGS, *STRICT, *flags, str(source), "-o", str(library)]
+    command = [
+        *c_compiler.compiler(),
+        *build.FLAGS,
+        *STRICT,
+        *flags,
+        str(source),
+        "-o",
+        str(library),
+    ]
     subprocess.run([*command, "-lm"], check=True)
     return CellKernels(d.name, ctypes.CDLL(str(library)))
 

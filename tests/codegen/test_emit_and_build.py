@@ -16,7 +16,7 @@ import numpy.typing as npt
 import pytest
 import sympy as sp
 
-from softehl.codegen import abi, pipeline
+from softehl.codegen import abi, c_compiler, pipeline
 from softehl.codegen.abi import AT_POINTS, BuildError, Target, Task, function_name
 from softehl.codegen.elements import quadrature
 from softehl.codegen.emit import c_source
@@ -286,7 +286,7 @@ def sanitized(directory: Path, flags: Sequence[str] = ()) -> Path:
     """The driver and all shipped C, with sanitizers; skips where the compiler has none."""
     probe = directory / "probe.c"
     probe.write_text("int main(void) { return 0; }\n")
-    base = [*build.compiler(), *SANITIZE, *build.STRICT, "-std=c11"]
+    base = [*c_compiler.compiler(), *SANITIZE, *build.STRICT, "-std=c11"]
     done = subprocess.run([*base, str(probe), "-o", str(directory / "probe")], capture_output=True)
     if done.returncode:
         pytest.skip("this C compiler has no sanitizers")

@@ -131,7 +131,7 @@ def test_a_page_that_is_wrong() -> None:
         (LAW, {"function": "rule"}, "has no function rule"),
         (LAW, {"derivatives": 3}, "derivatives = 3, must be 0, 1 or 2"),
         (LAW, {"outputs": 0}, "outputs = 0, must be a number"),
-        (1234, {}, "the address of a function goes to Study.add"),
+        (1234, {}, "give a C file, its text, or a function of ctypes"),
     ):
         with pytest.raises(ModelError, match=message):
             spring(source, **{"derivatives": None, **more})  # type: ignore[arg-type]
@@ -232,6 +232,33 @@ def test_an_address_is_given_to_a_study(tmp_path: Path) -> None:
         result.sensitivity("T", at=(1.0, 0.5), by={"body": ["law"]})
     with pytest.raises(softehl.TargetError, match="has no addresses"):
         host_files.files(diffusion.definitions(cell_options())[0], "c")
+
+
+def test_a_page_knows_the_address_itself(tmp_path: Path) -> None:
+    """Its derivatives are checked, a study needs no more, and a wrong function is named."""
+
+    def page(function: Any) -> Any:
+        @softehl.page
+        def known(m):
+            T = m.scalar("T")
+            (d,) = m.parameters(d="factor")
+            g = m.grad(T)
+            m.weak(sp.Matrix([m.external("law", [g[0], d], source=function), g[1]]), g)
+
+        return known
+
+    expected = heat(by_text).solve().values("T")
+    assert np.abs(heat(page(law_in_python)).solve().values("T") - expected).max() < 1e-14
+    with pytest.raises(ExternalFunctionError, match=r"dy\[0\]\[0\] of law"):
+        kernel_cache.derive(page(wrong_law_in_python).definitions(cell_options()))
+
+
+@ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.POINTER(ctypes.c_double)] * 4)
+def wrong_law_in_python(x, y, dy, ddy):
+    law_in_python(x, y, dy, ddy)
+    if dy:
+        dy[0] *= 2
+    return 0
 
 
 def cell_options() -> Any:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from softehl.codegen import pipeline
+from softehl.codegen import c_compiler, pipeline
 from softehl.codegen.elements import quadrature
 from softehl.codegen.emit import c_source
 from softehl.codegen.graph.evaluation import State
@@ -230,7 +230,7 @@ def functions(
     (folder / c_source.HEADER).write_text(c_source.header([]))
     (folder / "run.c").write_text(DRIVER)
     flags = [f for f in build.FLAGS if f != "-shared"]
-    line = [*build.compiler(), *flags, request.param, "-Wno-psabi", "-shared"]
+    line = [*c_compiler.compiler(), *flags, request.param, "-Wno-psabi", "-shared"]
     made = folder / "run.so"
     subprocess.run([*line, str(folder / "run.c"), "-o", str(made), "-lm"], check=True)
     run = ctypes.CDLL(str(made)).run

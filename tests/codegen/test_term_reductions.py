@@ -18,7 +18,7 @@ from softehl import Mesh, Model, Study, quadrature
 from softehl.codegen import pipeline
 from softehl.codegen.graph.partial_derivatives import DifferentiationError
 from softehl.codegen.language.errors import ModelError
-from softehl.codegen.tools import kernel_cache, user_kernels
+from softehl.codegen.tools import build, kernel_cache, user_kernels
 from softehl.codegen.verify import verification
 from softehl.runtime.kernels.kernel_call import ArgumentError
 from softehl.runtime.study import StudyError
@@ -83,7 +83,7 @@ def test_its_check_in_90_digits(kind: str) -> None:
     d = spring(kind)
     library = kernel_cache.library([d])
     tasks = list(user_kernels._entries(library.files)[d.name]["tasks"])
-    report = verification.check(d, tasks, library.folder / kernel_cache.build.LIBRARY, seconds=3)
+    report = verification.check(d, tasks, library.folder / build.LIBRARY, seconds=3)
     assert set(report.errors) == set(tasks)
     assert max(report.errors.values()) < 1e-13
 
