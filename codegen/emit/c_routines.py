@@ -13,9 +13,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Sequence
 
-from softehl.codegen.emit import array_routines, tensor_routines, term_loops
+from softehl.codegen.emit import array_routines, bessel_routine, tensor_routines, term_loops
 from softehl.codegen.emit.c_printer import Printer, array_arguments, array_operands, number
 from softehl.codegen.emit.code_motion import schedule
+from softehl.codegen.graph.bessel import Bessel
 from softehl.codegen.graph.divided_difference import Quotient, SecondQuotient
 from softehl.codegen.graph.graph import Graph, Node, Op, Routine
 from softehl.codegen.graph.routines import (
@@ -180,6 +181,8 @@ def _text(d: Definition, r: Routine) -> list[str]:
             return _external(d, r)
         case SecondQuotient():
             return [tensor_routines.second_quotient(r, _signature(d, r), arrays_unused(d))]
+        case Bessel():
+            return bessel_routine.text(r, _signature(d, r), arrays_unused(d))
         case Kernel():
             return tensor_routines.text(r, _signature(d, r), arrays_unused(d))
     raise TypeError(f"no C for {r}")

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from softehl.codegen.emit import array_routines, c_routines, tensor_routines, term_loops
 from softehl.codegen.emit.c_printer import array_arguments, array_operands, number
 from softehl.codegen.emit.simd_printer import LanePrinter
+from softehl.codegen.graph.bessel import Bessel
 from softehl.codegen.graph.divided_difference import Quotient, SecondQuotient
 from softehl.codegen.graph.graph import Routine
 from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton
@@ -34,7 +35,7 @@ def _text(d: Definition, r: Routine) -> list[str]:
         case Kernel() if tensor_routines.in_lanes(r):
             unused = c_routines.arrays_unused(d)
             return tensor_routines.text(r, _signature(d, r), unused, tensor_routines.LANES)
-        case Isotropic() | External() | Quotient() | SecondQuotient() | Kernel():
+        case Isotropic() | External() | Quotient() | SecondQuotient() | Kernel() | Bessel():
             return [*c_routines.texts(d, [r]), _one_by_one(d, r)]
         case Reduction():
             values, targets = term_loops.bodies(r)

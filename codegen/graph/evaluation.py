@@ -17,6 +17,7 @@ import mpmath
 from mpmath.libmp import NoConvergence
 
 from softehl.codegen.graph import matrix_functions
+from softehl.codegen.graph.bessel import Bessel
 from softehl.codegen.graph.graph import Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.precise_arithmetic import arctangent, number
 from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton, depends
@@ -57,6 +58,10 @@ def results(r: Routine, args: Vector, evaluate: Evaluate) -> Vector:
             return [mpmath.nan] * r.outputs if values is None else values
         case ArrayRoutine():  # of any array, where none is given
             return _of_array(r, exact(r.layout.sample(random.Random(r.name))), (), args)
+        case Bessel():
+            scale = mpmath.fac2(2 * r.order + 1)
+            square = mpmath.fsum(a**2 for a in args)
+            return [mpmath.hyp0f1(r.order + mpmath.mpf(3) / 2, -square / 4) / scale]
         case TensorRoutine():
             return _tensor(r, args, evaluate)
     raise TypeError(f"no value for {r}")

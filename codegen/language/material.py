@@ -42,7 +42,8 @@ class Material:
         Model that the law is part of. Its `parameters`, `require`, `point_data`, `history`,
         `fields`, `norm`, `derivative`, `example`, `table`, `network`, `array`, `sum`, `product`,
         `minimum`, `maximum`, `point_array`, `each` and functions of tensors (`log`, `sqrt`, `exp`,
-        `power`, `isotropic`, `eigenvalues`) are methods here as well.
+        `power`, `isotropic`, `eigenvalues`) and of rotations (`sinc`, `cosc`, `rotation`,
+        `rotation_vector`) are methods here as well.
     W : Expr or None
         Energy per reference volume [MPa].
     P : Matrix or None
@@ -69,6 +70,8 @@ class Material:
         self.sum, self.product = model.sum, model.product
         self.minimum, self.maximum = model.minimum, model.maximum
         self.point_array, self.each = model.point_array, model.each
+        self.sinc, self.cosc = model.sinc, model.cosc
+        self.rotation, self.rotation_vector = model.rotation, model.rotation_vector
 
     @property
     def F(self) -> Any:

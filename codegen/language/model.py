@@ -871,6 +871,90 @@ class Model(ModelBuilder):
         """
         return self._tensors.eigenvalues(C)
 
+    # functions that are smooth at zero ----------------------------------------------------------
+
+    def sinc(self, x: Any) -> Any:
+        """Return sin(x) / x, which is 1 at zero.
+
+        Parameters
+        ----------
+        x : Expr
+            A scalar.
+
+        Returns
+        -------
+        Symbol
+            The value. Derivatives of any order are exact to rounding at every x.
+
+        Raises
+        ------
+        ModelError
+            x is no scalar.
+        """
+        return self._smooth.sinc(x)
+
+    def cosc(self, x: Any) -> Any:
+        """Return (1 - cos(x)) / x^2, which is 1/2 at zero.
+
+        Parameters
+        ----------
+        x : Expr
+            A scalar.
+
+        Returns
+        -------
+        Expr
+            The value. Derivatives of any order are exact to rounding at every x.
+
+        Raises
+        ------
+        ModelError
+            x is no scalar.
+        """
+        return self._smooth.cosc(x)
+
+    def rotation(self, w: Any) -> Any:
+        """Return the rotation by an angle |w| about the axis w (Rodrigues).
+
+        Parameters
+        ----------
+        w : list or Matrix
+            Rotation vector, three entries.
+
+        Returns
+        -------
+        Matrix
+            Orthogonal matrix (3, 3), the exponential of the skew matrix of w. Derivatives of any
+            order are exact to rounding, also at w = 0.
+
+        Raises
+        ------
+        ModelError
+            w has another number of entries.
+        """
+        return self._smooth.rotation(w)
+
+    def rotation_vector(self, R: Any) -> Any:
+        """Return the rotation vector of a rotation, the inverse of `rotation`.
+
+        Parameters
+        ----------
+        R : Matrix
+            Rotation (3, 3).
+
+        Returns
+        -------
+        Matrix
+            (3, 1), of a length of at most pi. Derivatives are exact to rounding; across half a turn
+            the vector changes its sign.
+
+        Raises
+        ------
+        ModelError
+            R has another shape.
+        """
+        return self._smooth.rotation_vector(R)
+
     def derivative(self, name: str, value: Any, by: Any) -> Any:
         """Return derivatives of a scalar, such as P = dW/dF.
 

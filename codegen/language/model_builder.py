@@ -27,6 +27,7 @@ from softehl.codegen.language import local_unknowns
 from softehl.codegen.language.definition import Argument, Condition, Definition, TermHistory
 from softehl.codegen.language.errors import ModelError, NoEquationsError, page_line, warn_page
 from softehl.codegen.language.flatten import CheckedList, Entries, Matrix
+from softehl.codegen.language.smooth_functions import SmoothFunctions
 from softehl.codegen.language.sympy_lowering import Symbols
 from softehl.codegen.language.sympy_tape import Integral
 from softehl.codegen.language.tensor_functions import TensorFunctions
@@ -575,6 +576,7 @@ class ModelBuilder:
         self._arguments = Arguments(self._symbols, nodes)
         self._intermediates = Intermediates(self._symbols)
         self._tensors = TensorFunctions(self._symbols)
+        self._smooth = SmoothFunctions(self._symbols, self._intermediates.define)
         self._equations = Equations(self._symbols)
         self._outputs = Outputs(self._symbols)
         self._functions: dict[str, Node] = {}

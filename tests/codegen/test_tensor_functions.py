@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -73,9 +74,10 @@ def page(name: str, functions: dict[str, Scalar], size: int = 3) -> Definition:
     C = sp.Matrix(size, size, lambda i, j: e[PAIRS[size].index((min(i, j), max(i, j)))])
     p = m.parameters(**{f"p_{k}": "direction" for k in range(len(e))})
     chosen = m.parameters(**{f"is_{f}": "choice" for f in functions})
-    total, values = sp.Integer(0), {}
+    values: dict[str, Any] = {}
+    total = sp.Integer(0)
     for on, (f, function) in zip(chosen, functions.items(), strict=True):
-        Y = m.isotropic(C, lambda x, function=function: function(sp, x))
+        Y = m.isotropic(C, partial(function, sp))
         total += on * sum(a * Y[i, j] for a, (i, j) in zip(p, PAIRS[size], strict=True))
         values |= {f"{f}_{i}{j}": Y[i, j] for i, j in PAIRS[size]}
     m.potential(total)
@@ -153,9 +155,9 @@ def expected(entries: list[float], functions: dict[str, Scalar]) -> dict[str, tu
 
 def errors(
     kernel: Kernel, functions: dict[str, Scalar], entries: list[float]
-) -> dict[str, tuple[float, float, float]]:
+) -> dict[str, tuple[float, ...]]:
     """Errors relative to the largest entry of value, first and second derivatives."""
-    n, out = len(entries), {}
+    n, out = len(entries), dict[str, tuple[float, ...]]()
     right = expected(entries, functions)
     nowhere, u = np.zeros((1, 0)), np.array([entries])
     for k, name in enumerate(functions):
@@ -358,7 +360,7 @@ def test_a_tensor_function_on_a_side_that_is_not_taken(tmp_path: Path) -> None:
     m.potential(sp.Piecewise((L.trace(), a > sp.Abs(b)), (a**2 + b**2, True)))
     kernel = compiled(m.finish(), tmp_path)
     R, K = kernel.tangent(np.zeros((2, 0)), np.array([[2.0, 1.0], [1.0, 2.0]]))
-    np.testing.assert_allclose(R, [[4 / 3, -2 / 3], [2, 4]], rtol=1e-14)
+    np.testing.assert_allclose(R, np.array([[4 / 3, -2 / 3], [2.0, 4.0]]), rtol=1e-14)
     np.testing.assert_allclose(K[1], 2 * np.eye(2), rtol=1e-14)
 
 
