@@ -141,8 +141,19 @@ def _tensor(r: TensorRoutine, args: Vector, evaluate: Evaluate) -> Vector:
     """A part of a tensor function: its derivatives are differences of its value."""
     f = r.function
     n = f.entries
+    external = args[n : n + f.externals]
+    digits = mpmath.mp.dps
+    if r.part is not Part.VALUE:
+        with mpmath.workdps(3 * digits):
+            return _tensor_derivative(r, args, evaluate, mpmath.mpf(10) ** (-3 * digits // 4))
+    return _tensor_value(f, args[:n], external, evaluate)
+
+
+def _tensor_derivative(r: TensorRoutine, args: Vector, evaluate: Evaluate, h: Number) -> Vector:
+    """Central differences, in so many digits that they have those of the caller."""
+    f = r.function
+    n = f.entries
     external, p = args[n : n + f.externals], args[n + f.externals :]
-    h = mpmath.mpf(10) ** (-mpmath.mp.dps // 4)
 
     def value(x: Vector) -> Vector:
         return _tensor_value(f, x, external, evaluate)
@@ -152,8 +163,6 @@ def _tensor(r: TensorRoutine, args: Vector, evaluate: Evaluate) -> Vector:
         return [(a - b) / (2 * h) for a, b in zip(after, before, strict=True)]
 
     x = args[:n]
-    if r.part is Part.VALUE:
-        return value(x)
     if r.part is Part.CURVATURE:
         along = [partial(rate, j=j, of=value) for j in range(n)]
         return [mpmath.fdot(p, rate(x, i, along[j])) for i in range(n) for j in range(i, n)]

@@ -21,11 +21,20 @@ from tests.codegen.hosts.materials import j2
 from tests.codegen.hosts.workshop import errors, folder, made
 
 ROOT = Path(__file__).parents[3]
-(_found,) = model_loader.pages(ROOT / "docs" / "models" / "creep_law.py")
-assert isinstance(_found, Law)
-creeping: Law = _found
+
+
+def read(file: str) -> Law:
+    """The material of a page of the documentation."""
+    (law,) = model_loader.pages(ROOT / "docs" / file)
+    assert isinstance(law, Law)
+    return law
+
+
+creeping = read("models/creep_law.py")
+hencky_j2 = read("gallery/models/hencky_j2.py")
 VALUES = {
     "j2": {"G": 80.0, "K": 170.0, "sy": 0.5, "H": 10.0},
+    "hencky_j2": {"G": 80.0, "K": 170.0, "sy": 0.5, "H": 10.0},
     "creeping": {"mu": 0.4, "K": 2.0, "G": 0.6, "tau": 2.0},
 }
 PULL, INCREMENTS = 0.05, 4
@@ -62,6 +71,8 @@ def by_study(law: Law) -> Array:
         (j2, "abaqus"),
         (creeping, "calculix"),
         pytest.param(j2, "calculix", marks=pytest.mark.slow),
+        pytest.param(hencky_j2, "abaqus", marks=pytest.mark.slow),
+        pytest.param(hencky_j2, "calculix", marks=pytest.mark.slow),
         pytest.param(creeping, "abaqus", marks=pytest.mark.slow),
     ],
     ids=lambda v: v if isinstance(v, str) else v.name,
