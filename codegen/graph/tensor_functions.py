@@ -27,7 +27,7 @@ Nodes = list[Node]
 
 
 class Part(StrEnum):
-    """What a routine of a tensor function returns.
+    """Results of a routine of a tensor function.
 
     With Y(x) the results and x the entries of the matrix: VALUE Y; ADJOINT sum of p_i dY_i/dx_j;
     SLOPE dY_i/dx_j; CURVATURE the upper triangle of the sum of p_i d2Y_i/dx_j dx_k.

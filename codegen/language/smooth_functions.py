@@ -92,7 +92,7 @@ def _by_trace(R: Any, trace: Any) -> list[Any]:
 
 
 def _by_diagonal(R: Any, trace: Any, i: int) -> list[Any]:
-    """The same where the axis has its largest part along axis i."""
+    """Cosine and sine times axis, where the latter is largest along axis i."""
     j, k = (i + 1) % 3, (i + 2) % 3
     largest = sp.sqrt(1 + 2 * R[i, i] - trace) / 2
     v = [largest] * 3
