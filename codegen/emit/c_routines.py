@@ -20,6 +20,7 @@ from softehl.codegen.graph.bessel import Bessel
 from softehl.codegen.graph.divided_difference import Quotient, SecondQuotient
 from softehl.codegen.graph.graph import Graph, Node, Op, Routine
 from softehl.codegen.graph.routines import (
+    HIGHEST_OF_STRETCHES,
     External,
     Inverse,
     Isotropic,
@@ -167,7 +168,8 @@ def _text(d: Definition, r: Routine) -> list[str]:
         case Inverse():
             return [_ELIMINATE, _inverse(d, r)]
         case Isotropic():
-            return [_JACOBI, *_isotropic(d, r)]
+            twice = [_TWICE] if r.order == HIGHEST_OF_STRETCHES else []
+            return [_JACOBI, *twice, *_isotropic(d, r)]
         case Quotient():
             return quotient(r.op, _signature(d, r), arrays_unused(d))
         case Reduction():
@@ -324,9 +326,10 @@ static int {name}(
     return failed;
 }}
 """
+    size, values = (3, "c") if r.order < HIGHEST_OF_STRETCHES else (6, "softehl_twice(c)")
     text = f"""{_signature(d, r)}{{
-    double c[3], Q[9], w[{len(body.roots)}];
-    if (softehl_eigenvalues(p, c, Q) || {name}({arrays}c, p + 6, w)) {{
+    double c[{size}], Q[9], w[{len(body.roots)}];
+    if (softehl_eigenvalues(p, c, Q) || {name}({arrays}{values}, p + 6, w)) {{
         for (int k = 0; k < {r.outputs}; ++k) s[k] = NAN;
         return 1;
     }}
@@ -336,7 +339,10 @@ static int {name}(
     return [*texts(d, body.called), local, text]
 
 
-_CONTENT = ("energy", "first derivatives", "first and second derivatives")
+_CONTENT = (
+    *("energy", "first derivatives", "first and second derivatives"),
+    "third derivatives, those of divided differences, and the second of these",
+)
 
 _TERMS = """/* What cancels in an equation: the sum of |slope * value| over the local unknowns
    and all that comes from outside. */
@@ -417,7 +423,25 @@ static int softehl_eigenvalues(const double *restrict C, double *restrict c, dou
 }
 """
 
+_TWICE = """/* Eigenvalues, and each of them once more. */
+static const double *softehl_twice(double *restrict c)
+{
+    for (int k = 0; k < 3; ++k) c[3 + k] = c[k];
+    return c;
+}
+"""
+
 _ENTRIES = """    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+"""
+_IN_BASIS = f"""{_ENTRIES}    double E[6][6];
+    for (int k = 0, a = 0; a < 3; ++a)
+        for (int b = a; b < 3; ++b) {{
+            const int n = a == b ? a : 3 + k++;
+            for (int i = 0; i < 6; ++i) {{
+                const double *x = Q + 3 * row[i], *y = Q + 3 * column[i];
+                E[n][i] = (i > 2 ? 1.0 : 0.5) * (x[a] * y[b] + x[b] * y[a]);
+            }}
+        }}
 """
 _ASSEMBLE = (
     """    s[0] = w[0];
@@ -449,5 +473,29 @@ _ASSEMBLE = (
             s[n] = 0.0;
             for (int k = 0; k < 6; ++k) s[n] += E[k][i] * H[k][j];
         }}
+""",
+    f"""{_IN_BASIS}    static const int at[3][3][3] = {{
+        {{{{0, 1, 2}}, {{1, 3, 4}}, {{2, 4, 5}}}},
+        {{{{1, 3, 4}}, {{3, 6, 7}}, {{4, 7, 8}}}},
+        {{{{2, 4, 5}}, {{4, 7, 8}}, {{5, 8, 9}}}}}};
+    for (int n = 0, i = 0; i < 6; ++i)
+        for (int j = i; j < 6; ++j)
+            for (int k = j; k < 6; ++k, ++n) {{
+                s[n] = 0.0;
+                for (int a = 0; a < 3; ++a)
+                    for (int b = 0; b < 3; ++b)
+                        for (int e = 0; e < 3; ++e)
+                            s[n] += w[at[a][b][e]] * E[a][i] * E[b][j] * E[e][k];
+                for (int m = 0; m < 3; ++m)
+                    for (int e = 0; e < 3; ++e) {{
+                        const double *x = E[3 + m], *y = E[e];
+                        const double t = y[i] * x[j] * x[k] + y[j] * x[i] * x[k];
+                        s[n] += 2.0 * w[10 + 3 * m + e] * (t + y[k] * x[i] * x[j]);
+                    }}
+                for (int m = 0; m < 3; ++m) {{
+                    const double *x = E[3 + m], *y = E[3 + (m + 1) % 3], *z = E[3 + (m + 2) % 3];
+                    s[n] += 2.0 * w[19] * x[i] * (y[j] * z[k] + z[j] * y[k]);
+                }}
+            }}
 """,
 )

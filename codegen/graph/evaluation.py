@@ -20,7 +20,15 @@ from softehl.codegen.graph import matrix_functions
 from softehl.codegen.graph.bessel import Bessel
 from softehl.codegen.graph.graph import Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.precise_arithmetic import arctangent, number
-from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton, depends
+from softehl.codegen.graph.routines import (
+    HIGHEST_OF_STRETCHES,
+    TRIPLES,
+    External,
+    Inverse,
+    Isotropic,
+    Newton,
+    depends,
+)
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine
 from softehl.codegen.graph.tensor_functions import (
     Eigenvalues,
@@ -128,6 +136,8 @@ def _isotropic(r: Isotropic, args: Vector, evaluate: Evaluate) -> Vector:
         paths = [(i,) for i in range(6)]
     elif r.order == 2:
         paths = [(i, j) for i in range(6) for j in range(i, 6)]
+    elif r.order == HIGHEST_OF_STRETCHES:
+        paths = [*TRIPLES]
     return [derivative(args[:6], path) for path in paths]
 
 

@@ -270,8 +270,8 @@ class Isotropic(Routine):
     """A symmetric function w of the eigenvalues of C, or its derivatives by the entries of C.
 
     Operands: C_11, C_22, C_33, C_12, C_13, C_23, then what else enters w.  Results by `order`: 0:
-    w; 1: the six derivatives; 2: the upper triangle of the 6x6 second derivatives, row by row.
-    They are exact also where eigenvalues are equal or nearly so.
+    w; 1: the six derivatives; 2: the upper triangle of the 6x6 second derivatives, row by row; 3:
+    the third ones, as `TRIPLES`. They are exact also where eigenvalues are equal or nearly so.
     """
 
     energy: Node
@@ -279,14 +279,20 @@ class Isotropic(Routine):
     _relatives: dict[str, Routine] = field(default_factory=dict)
 
     def partials(self, g: Graph, item: Node) -> Pairs:
-        if self.order == 2:
+        if self.order == HIGHEST_OF_STRETCHES:
             raise DifferentiationError(
-                f"{self.name}: a function of principal stretches has no third derivatives, write "
+                f"{self.name}: a function of principal stretches has no fourth derivatives, write "
                 "it by invariants"
             )
         args, k = item.args[0].args, result_index(item)
         raised = g.run(self._relative(self.energy, self.order + 1, self.name), args)
-        by_C = raised if self.order == 0 else [raised[upper(k, i)] for i in range(6)]
+        if self.order == 0:
+            by_C = raised
+        elif self.order == 1:
+            by_C = [raised[upper(k, i)] for i in range(6)]
+        else:
+            pair = _UPPER[k]
+            by_C = [raised[TRIPLES.index(tuple(sorted((*pair, i))))] for i in range(6)]
         pairs = list(zip(args, by_C, strict=False))
         for j, p in enumerate(args[6:]):
             source = g.input("external", j)
@@ -305,7 +311,7 @@ class Isotropic(Routine):
 
 def isotropic(name: str, inputs: int, energy: Node, order: int = 0) -> Isotropic:
     """The routine of a localised symmetric function of three eigenvalues."""
-    return Isotropic(name, inputs, (1, 6, 21)[order], energy, order)
+    return Isotropic(name, inputs, (1, 6, 21, len(TRIPLES))[order], energy, order)
 
 
 def upper(i: int, j: int) -> int:
@@ -314,15 +320,22 @@ def upper(i: int, j: int) -> int:
     return i * 6 - i * (i - 1) // 2 + j - i
 
 
+_UPPER = [(i, j) for i in range(6) for j in range(i, 6)]
+TRIPLES: list[tuple[int, ...]] = [
+    (i, j, k) for i in range(6) for j in range(i, 6) for k in range(j, 6)
+]
+"""Order of the third derivatives by the entries of a symmetric matrix."""
+HIGHEST_OF_STRETCHES = 3
+
 PAIRS = ((0, 1), (0, 2), (1, 2))
 """Order of the pairs of eigenvalues."""
 
 
 def derivatives_of_energy(g: Graph, r: Isotropic) -> list[Node]:
-    """Values that the C function of order 0, 1 or 2 needs: w; w_a; w_a, then those below.
+    """Values that the C function of an order needs: 0: w; 1: w_a; 2: w_a, then those below.
 
-    The upper triangle of w_ab, row by row, then (w_a - w_b) / (c_a - c_b) of every pair: w_b is
-    w_a with the two exchanged.
+    The upper triangle of w_ab, row by row, then d_ab = (w_a - w_b) / (c_a - c_b) of every pair: w_b
+    is w_a with the two exchanged. For the order 3: see `_third_derivatives`.
     """
     if r.order == 0:
         return [r.energy]
@@ -330,9 +343,38 @@ def derivatives_of_energy(g: Graph, r: Isotropic) -> list[Node]:
     first = gradient(g, r.energy, c)
     if r.order == 1:
         return [first[a] for a in c]
+    if r.order == HIGHEST_OF_STRETCHES:
+        return _third_derivatives(g, c, [first[a] for a in c])
     second = [gradient(g, first[a], c)[b] for k, a in enumerate(c) for b in c[k:]]
     divided = [exchange_inputs(g, [first[c[a]]], c[a], c[b])(first[c[a]]) for a, b in PAIRS]
     return [*(first[a] for a in c), *second, *divided]
+
+
+def _third_derivatives(g: Graph, c: Sequence[Node], first: Sequence[Node]) -> list[Node]:
+    """The w_abc with a <= b <= c, the derivatives of every d_ab by the three eigenvalues, d_123.
+
+    That by a third eigenvalue is (w_ak - w_bk) / (c_a - c_b); that by c_a itself is the divided
+    difference of d_ab when c_a moves to another value, which the caller gives as the input 3 + a
+    and sets equal to it. d_123 = (d_13 - d_23) / (c_1 - c_2) is symmetric in all three.
+    """
+    third = []
+    for i in range(3):
+        for j in range(i, 3):
+            bent = gradient(g, gradient(g, first[i], c)[c[j]], c)
+            third += [bent[a] for a in c[j:]]
+    slopes = []
+    divided = [exchange_inputs(g, [first[a]], c[a], c[b])(first[a]) for a, b in PAIRS]
+    for d, (a, b) in zip(divided, PAIRS, strict=True):
+        for k in range(3):
+            if k in (a, b):
+                other = g.input("local", 3 + k)
+                moved = Divided(g, {c[k]: other}, g.sub(c[k], other), {c[k]: g.one})
+                slopes.append(moved(d))
+            else:
+                slope = gradient(g, first[a], c)[c[k]]
+                slopes.append(exchange_inputs(g, [slope], c[a], c[b])(slope))
+    d_13 = divided[1]
+    return [*third, *slopes, exchange_inputs(g, [d_13], c[0], c[1])(d_13)]
 
 
 # ------------------------------------------------------------------------- functions of the user

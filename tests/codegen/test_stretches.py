@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from softehl import load_kernel as load
 from softehl.codegen.elements import quadrature
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.errors import ModelError
@@ -287,3 +289,43 @@ def test_the_derivative_by_a_matrix_is_symmetric(tmp_path: Path) -> None:
     np.testing.assert_allclose(kernel.residual(*at).reshape(3, 3), 4 * F_at @ right, atol=1e-13)
     checked = verification.check(d, ("residual", "fields"), tmp_path / build.LIBRARY, seconds=1)
     assert max(checked.errors.values()) <= verification.BOUND
+
+
+def test_third_derivatives_at_every_gap() -> None:
+    """D^3 W[a, b, .] of Ogden, Hencky and volume by mixed differences in 80 digits."""
+    kernel = load(stretches(), derivatives=2)
+    generator = np.random.default_rng(7)
+    a, b = generator.normal(size=(2, 6))
+    direction = np.concatenate([np.zeros(3), a, b, np.zeros(6)])[None]
+
+    def energy(entries: Any) -> Any:
+        p, q, r, d, e, f = entries
+        C = mpmath.matrix([[p, d, e], [d, q, f], [e, f, r]])
+        x = [mpmath.sqrt(c) for c in mpmath.eigsy(C, eigvals_only=True)]
+        mu, alpha, beta = map(mpmath.mpf, PARAMETERS)
+        hencky = beta * sum(mpmath.log(v) ** 2 for v in x)
+        return mu / alpha * (sum(v**alpha for v in x) - 3) + hencky + (x[0] * x[1] * x[2] - 1) ** 2
+
+    def mixed(C: list[float], k: int) -> float:
+        step, total = mpmath.mpf(10) ** -15, 0
+        for signs in itertools.product((1, -1), repeat=3):
+            r, s, t = (step * sign for sign in signs)
+            moved = [
+                mpmath.mpf(v) + r * mpmath.mpf(x) + s * mpmath.mpf(y) + t * (i == k)
+                for i, (v, x, y) in enumerate(zip(C, a, b, strict=True))
+            ]
+            total += int(np.prod(signs)) * energy(moved)
+        return float(total / (2 * step) ** 3)
+
+    states = [turned(1.44 * (1 + gap), 1.44, 0.7) for gap in GAPS]
+    states += [turned(1.3 * (1 + gap), 1.3, 1.3 * (1 - gap / 2)) for gap in GAPS]
+    states += [np.eye(3), np.diag([1.2, 1.2, 0.5]), turned(30.0, 0.05, 0.6)]
+    with mpmath.workdps(80):
+        for state in states:
+            C = unknowns(state)
+            found = kernel.adjoint_rate(
+                np.zeros((1, 0)), np.array([C]), direction, parameters=np.array(PARAMETERS)
+            )[0, 3:]
+            expected = np.array([mixed(C, k) for k in range(6)])
+            bound = 1e-12 if state[0, 0] > 10 else 1e-14
+            assert np.abs(found - expected).max() <= bound * np.abs(expected).max(), state

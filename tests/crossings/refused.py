@@ -38,7 +38,7 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     ),
     ((), _again, "prescribed twice"),
     (("hessian",), lambda at: at.load == "weight", "comes as C without second derivatives"),
-    (("hessian",), lambda at: at.law in ("ogden", "split", "learned"), "no third derivatives"),
+    (("hessian",), lambda at: at.law == "learned", "no third derivatives"),
     (
         ("static state", "equilibrium"),
         lambda at: at.analysis == "explicit" and _mixed(at),
