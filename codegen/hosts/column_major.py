@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from softehl.codegen.abi import TargetError, Task
+from softehl.codegen.abi import ARRAY_ENTRIES, TargetError, Task
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts.c_library import sample_arrays
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.test_states import Sample
+from softehl.codegen.verify.kernel_batch import parameters_of
 
 LETTERS = 63
 """Longest name of Fortran 2018 and of MATLAB."""
@@ -22,12 +23,16 @@ LETTERS = 63
 
 @dataclass(frozen=True)
 class Array:
-    """An argument: name, sizes without elements, meaning; `each`: has elements as last index."""
+    """An argument: name, sizes without elements, meaning.
+
+    each: has elements as last index. longer: the size is the least one.
+    """
 
     name: str
     shape: tuple[int, ...]
     meaning: str
     each: bool = True
+    longer: bool = False
 
 
 def inputs(interface: ElementInterface) -> list[Array]:
@@ -38,9 +43,23 @@ def inputs(interface: ElementInterface) -> list[Array]:
         Array("X", (s["DIMENSION"], s["NODES"]), "reference coordinates of the nodes"),
         Array("u", (s["UNKNOWNS"],), "unknowns"),
         Array("data", (width,), "data of the element, then those of its points"),
-        Array("p", (s["PARAMETERS"],), "parameters", each=False),
+        _parameters(interface),
     ]
     return [a for a in rows if all(a.shape)]
+
+
+def _parameters(interface: ElementInterface) -> Array:
+    """Parameters; behind them curves, networks and terms, as long as they are."""
+    d = interface.definition
+    size = len(d.parameters) + ARRAY_ENTRIES * len(d.arrays)
+    meaning = "parameters, then curves, networks and terms" if d.arrays else "parameters"
+    return Array("p", (size,), meaning, each=False, longer=bool(d.arrays))
+
+
+def with_length(arguments: Sequence[Array], references: Sequence[Sample]) -> list[Array]:
+    """Arguments with the length that the parameters of the states have."""
+    length = len(parameters_of(references[0].state))
+    return [replace(a, shape=(length,)) if a.longer else a for a in arguments]
 
 
 def results(interface: ElementInterface, task: str) -> list[Array]:
@@ -87,7 +106,9 @@ def procedures(interface: ElementInterface) -> list[str]:
 
 def solves(interface: ElementInterface) -> bool:
     """True for an element with unknowns at nodes of a standard cell: a patch can be solved."""
-    return interface.cell is not None and not interface.free and Task.TANGENT in interface.tasks
+    d = interface.definition
+    possible = interface.cell is not None and Task.TANGENT in interface.tasks
+    return possible and not interface.free and not d.arrays
 
 
 def lists(interface: ElementInterface, task: str) -> tuple[list[Array], list[Array]]:
@@ -117,7 +138,8 @@ def array_rows(interface: ElementInterface) -> str:
 
 def bounds(a: Array) -> str:
     """Sizes of an argument with n elements, with commas."""
-    return ", ".join([*map(str, a.shape), *(["n"] if a.each else [])])
+    sizes = [f"at least {v}" if a.longer else str(v) for v in a.shape]
+    return ", ".join([*sizes, *(["n"] if a.each else [])])
 
 
 def require_name(name: str, host: str) -> None:

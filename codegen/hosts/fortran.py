@@ -15,6 +15,7 @@ from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.material_response import at_one_point
 from softehl.codegen.hosts.registry import Host
 from softehl.codegen.hosts.test_states import Sample, samples
+from softehl.codegen.verify.kernel_batch import parameters_of
 
 
 def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
@@ -33,7 +34,7 @@ def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, st
     }
     texts[f"{interface.name}.f90"] = source(interface)
     texts["values.txt"] = column_major.sample_text(interface, references)
-    texts["test.f90"] = test(interface)
+    texts["test.f90"] = test(interface, references)
     texts["example.f90"] = example(interface, references[0])
     if solves:
         texts |= _patch(interface, references)
@@ -42,7 +43,7 @@ def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, st
     return texts
 
 
-FORTRAN = Host(element=module, material=at_one_point(module))
+FORTRAN = Host(element=module, material=at_one_point(module), arrays=True)
 
 
 def _check_names(interface: ElementInterface) -> None:
@@ -155,10 +156,7 @@ def _procedure(interface: ElementInterface, task: str) -> str:
         "    integer :: n" + (", e" if turned else ""),
         *(["    real(c_double) :: none(1)"] if "none" in actual else []),
         f"    n = size({counted}, {counted_rank})",
-        *(
-            f"    call check_shape('{name}', '{a.name}', shape({a.name}), [{bounds(a)}])"
-            for a in arrays
-        ),
+        *(f"    call check_shape('{name}', {_shapes(a)})" for a in arrays),
         *(["    none = 0"] if "none" in actual else []),
         f"    call c_{task}(int(n, c_size_t), {', '.join(actual)})",
     ]
@@ -169,6 +167,13 @@ def _procedure(interface: ElementInterface, task: str) -> str:
             "    end do",
         ]
     return "\n".join([*lines, "  end subroutine", ""])
+
+
+def _shapes(a: Array) -> str:
+    """Name, shape and needed shape of an argument; of a longer one no more than it needs."""
+    needed = ", ".join([*map(str, a.shape), *(["n"] if a.each else [])])
+    found = f"[min(size({a.name}), {needed})]" if a.longer else f"shape({a.name})"
+    return f"'{a.name}', {found}, [{needed}]"
 
 
 def _numbers(values: Sequence[float]) -> str:
@@ -188,8 +193,9 @@ def example(interface: ElementInterface, first: Sample) -> str:
     """Example program that calls one function for one element and prints the result."""
     task = _first_task(interface)
     given, results = column_major.lists(interface, task)
+    given = column_major.with_length(given, [first])
     s = first.state
-    values = {"X": s.coordinates, "u": s.dofs, "data": first.data, "p": s.parameters}
+    values = {"X": s.coordinates, "u": s.dofs, "data": first.data, "p": parameters_of(s)}
     declared = [
         f"  real(real8) :: {a.name}({', '.join([*map(str, a.shape), *(['1'] if a.each else [])])})"
         for a in [*given, *results]
@@ -217,9 +223,9 @@ def example(interface: ElementInterface, first: Sample) -> str:
     )
 
 
-def test(interface: ElementInterface) -> str:
+def test(interface: ElementInterface, references: Sequence[Sample]) -> str:
     """The test program."""
-    given = column_major.inputs(interface)
+    given = column_major.with_length(column_major.inputs(interface), references)
     order = column_major.expected(interface)
     declared, read, spread = [], [], []
     for a in given:

@@ -23,7 +23,7 @@ def mex(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     texts, kernel = c_interface.files(interface)
     references = samples(interface, kernel, host.with_time_step(interface, states))
     solves = column_major.solves(interface)
-    substitutions = _substitutions(interface) | {
+    substitutions = _substitutions(interface, references) | {
         "patch": ", solve_patch" if solves else "",
         "patch_call": "; solve_patch;" if solves else "",
     }
@@ -42,10 +42,10 @@ def mex(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
     return texts
 
 
-MATLAB = Host(element=mex, material=at_one_point(mex))
+MATLAB = Host(element=mex, material=at_one_point(mex), arrays=True)
 
 
-def _substitutions(interface: ElementInterface) -> dict[str, object]:
+def _substitutions(interface: ElementInterface, references: Sequence[Sample]) -> dict[str, object]:
     """Values for the templates."""
     title = " ".join(f"{interface.name}: {interface.definition.doc}".split())
     rows = [title, "", *_usage(interface), ""]
@@ -64,7 +64,7 @@ def _substitutions(interface: ElementInterface) -> dict[str, object]:
         "tasks": ", ".join(column_major.procedures(interface)),
         "arrays": column_major.array_rows(interface),
         "usage": "\n    ".join(_usage(interface)),
-        "read": _read(interface),
+        "read": _read(interface, references),
         "inputs": _inputs(interface),
         "checks": _checks(interface),
         "limit": LIMIT,
@@ -113,7 +113,7 @@ def _case(interface: ElementInterface, task: str) -> str:
         lines += [
             f"        const size_t shape_{a.name}[] = {{{shape}}};",
             f'        const double *{a.name} = given(prhs[{j + 1}], "{a.name}", '
-            f"shape_{a.name}, {max(len(a.shape), 1)}, {'n' if a.each else 1});",
+            f"shape_{a.name}, {max(len(a.shape), 1)}, {'n' if a.each else 1}, {int(a.longer)});",
         ]
     for j, a in enumerate(results):
         shape = ", ".join(map(str, a.shape)) or "1"
@@ -140,10 +140,10 @@ def _case(interface: ElementInterface, task: str) -> str:
     return "\n".join([*lines, "        return;", "    }", ""])
 
 
-def _read(interface: ElementInterface) -> str:
+def _read(interface: ElementInterface, references: Sequence[Sample]) -> str:
     """Lines of the test that read values.txt."""
     lines = []
-    for a in column_major.inputs(interface):
+    for a in column_major.with_length(column_major.inputs(interface), references):
         if a.each:
             lines.append(_take(a, f"page.{a.name}"))
             lines.append(f"{a.name} = page.{a.name}({':, ' * len(a.shape)}turn);")

@@ -15,9 +15,9 @@ static size_t count(int nrhs, const mxArray *prhs[], int wanted, int which, size
     return mxGetNumberOfElements(prhs[which]) / size;
 }
 
-/* Numbers of an argument of a shape, n times. */
-static const double *given(
-    const mxArray *array, const char *name, const size_t *shape, int rank, size_t n)
+/* Numbers of an argument of a shape, n times; or of a vector that is that long or longer. */
+static const double *given(const mxArray *array, const char *name, const size_t *shape, int rank,
+    size_t n, int longer)
 {
     size_t size = 1;
     for (int k = 0; k < rank; ++k)
@@ -31,6 +31,7 @@ static const double *given(
         for (int k = 0; k < rank; ++k)
             fits = fits && k < (int)mxGetNumberOfDimensions(array)
                 && mxGetDimensions(array)[k] == (mwSize)shape[k];
+    fits = fits || (longer && found > size);
     if (!fits)
         mexErrMsgIdAndTxt("softehl:shape",
             "@name@: %s has %d numbers in %d rows, needs %d rows and %d numbers: help @name@", name,

@@ -44,6 +44,17 @@ def bar() -> Definition:
     return m.finish()
 
 
+def branches() -> Definition:
+    """Springs in parallel, as many as their stiffnesses, and a curve."""
+    m = Model("branches", nodes=2, rule=quadrature.gauss(1, 1))
+    (X,), (u,) = m.coordinates("X"), m.nodal_unknowns("u")
+    (c,) = m.parameters(c="factor")
+    e = m.define("e", (u[1] - u[0]) / (X[1] - X[0]))
+    k = m.array("k", "stiffness [N]")
+    m.potential(c * m.sum(k, lambda each: each * e**2) + m.table("w", e))
+    return m.finish()
+
+
 @needs_fortran
 @pytest.mark.parametrize(
     ("page_or_law", "checks"),
@@ -52,6 +63,7 @@ def bar() -> Definition:
         pytest.param(j2, 6, id="branches, history"),
         pytest.param(definition(MODELS / "heat.py"), 7, marks=pytest.mark.slow, id="rates"),
         pytest.param(bar(), 7, id="bar"),
+        pytest.param(branches(), 7, marks=pytest.mark.slow, id="arrays of run time"),
         pytest.param(page("tri6", A**2, A * B, conservative=False), 10, id="tri6"),
     ],
 )

@@ -24,7 +24,7 @@ from tests.codegen.hosts.test_abaqus_element import (
     patched,
     study,
 )
-from tests.codegen.hosts.test_fortran import bar, named
+from tests.codegen.hosts.test_fortran import bar, branches, named
 from tests.codegen.hosts.workshop import errors, folder, made
 
 needs_octave = pytest.mark.skipif(
@@ -41,6 +41,7 @@ STRICT = "-O1 -Wall -Wextra -Werror -Wno-psabi"
         pytest.param(j2, 8, marks=pytest.mark.slow, id="branches, history"),
         pytest.param(definition(MODELS / "heat.py"), 6, marks=pytest.mark.slow, id="rates"),
         pytest.param(bar(), 7, marks=pytest.mark.slow, id="bar"),
+        pytest.param(branches(), 7, marks=pytest.mark.slow, id="arrays of run time"),
         pytest.param(page("line2", A**2, A * B, conservative=False), 8, id="line2"),
     ],
 )
