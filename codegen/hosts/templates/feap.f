@@ -46,6 +46,7 @@ c     tangent and residual, residual alone
         if(bad.ne.0) then
           if(rvalu(1).gt.0.0d0) then
             rmeas = max(rmeas, 4.0d0)
+            write(iow,*) ' *WARNING* elmt01: no value, rmeas = 4'
           else
             call elmt01_stop(iow,
      &        'no value here: use AUTO,MATErial to cut the step')
