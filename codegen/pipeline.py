@@ -27,7 +27,12 @@ from dataclasses import dataclass, field, replace
 
 from softehl.codegen import external_function
 from softehl.codegen.abi import DESIGN, ROLLED, Target, TargetError, Task, derivative_task
-from softehl.codegen.derive import point_outputs, potential_structure, task_outputs
+from softehl.codegen.derive import (
+    point_outputs,
+    point_products,
+    potential_structure,
+    task_outputs,
+)
 from softehl.codegen.derive.output_entries import Entry, replace_values
 from softehl.codegen.derive.potential_structure import Structure
 from softehl.codegen.derive.task_outputs import Variant
@@ -35,6 +40,7 @@ from softehl.codegen.emit import (
     c_printer,
     c_routines,
     c_source,
+    product_loops,
     simd_kernel,
     simd_printer,
     simd_routines,
@@ -47,6 +53,7 @@ from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_kernel import Choice, choose
 from softehl.codegen.emit.points.point_layout import Layout, Needs
 from softehl.codegen.graph.graph import Routine
+from softehl.codegen.graph.traversal import operations
 from softehl.codegen.language.definition import Definition, functions_of_user
 from softehl.codegen.optimise import passes
 
@@ -266,8 +273,11 @@ def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Func
     """One kernel, all stages in the order of this file's first lines."""
     forms = potential_structure.linear_forms(d) if task_outputs.is_differentiated(task) else None
     structure = None if forms is None else potential_structure.quadratic_values(d, forms)
-    alternatives = [_for_target(v, task, target) for v in task_outputs.variants(d, task, structure)]
-    attempts = tuple(_attempts(d, task, alternatives))
+    attempts = _by_products(d, task, structure) if target is not Target.UFCX else ()
+    if not attempts:
+        variants = task_outputs.variants(d, task, structure)
+        alternatives = [_for_target(v, task, target) for v in variants]
+        attempts = tuple(_attempts(d, task, alternatives))
     best = min(attempts, key=lambda a: a.operations)
     entries, plan = best.entries, best.plan
     called = tuple(c_routines.called([x.node for x in entries]))
@@ -297,6 +307,29 @@ def _attempts(d: Definition, task: str, alternatives: Sequence[Variant]) -> Iter
         fewest = min(a.operations for a in looped)
     if fixed or (fixed is None and fewest <= SHORT):
         yield from (_attempt(d, variant, unrolled=True) for variant in alternatives)
+
+
+def _by_products(d: Definition, task: str, structure: Structure | None) -> tuple[Attempt, ...]:
+    """A large tangent as loops over products at the points; nothing for any other one."""
+    size = len(d.unknowns)
+    if task != Task.TANGENT or size < point_products.FEW or d.unroll:
+        return ()
+    if not point_products.is_vast(d):
+        usual = min(
+            task_outputs.variants(d, task, structure),
+            key=lambda v: operations([x.node for x in v.entries]),
+        )
+        if not point_products.is_large(usual.entries):
+            return ()
+    residual = next(task_outputs.variants(d, Task.RESIDUAL, structure)).entries
+    entries = point_products.outputs(d, residual)
+    if entries is None:
+        return ()
+    attempt = _attempt(d, Variant("products at the points", entries), unrolled=False)
+    if sum(s.loop is not None and bool(s.loop.outputs) for s in attempt.plan.stages) > 1:
+        return ()
+    loops = product_loops.operations(entries, size, symmetric=d.conservative)
+    return (replace(attempt, operations=attempt.operations + len(d.rule.points) * loops),)
 
 
 def _for_target(v: Variant, task: str, target: Target) -> Variant:

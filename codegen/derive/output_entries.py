@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum
 from typing import NamedTuple
 
 from softehl.codegen.graph.graph import Node
@@ -16,6 +17,15 @@ class Slot(NamedTuple):
     position: int
 
 
+class Array(Enum):
+    """Where an entry goes; the last three: of a tangent by products (`point_products`)."""
+
+    OUTPUT = ""
+    SLOPES = "B"
+    MODULI = "M"
+    ADDED = "k"
+
+
 @dataclass(frozen=True)
 class Entry:
     """One output value and where it goes."""
@@ -23,8 +33,9 @@ class Entry:
     row: Slot
     column: Slot | None
     node: Node
+    array: Array = Array.OUTPUT
 
 
 def replace_values(entries: Sequence[Entry], roots: Sequence[Node]) -> list[Entry]:
     """Entries with new values in the same rows and columns."""
-    return [Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
+    return [replace(x, node=n) for x, n in zip(entries, roots, strict=True)]

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from softehl.codegen import abi
-from softehl.codegen.derive.output_entries import Entry, Slot
+from softehl.codegen.derive.output_entries import Array, Entry, Slot
 from softehl.codegen.emit.batch_functions import functions, widths
 from softehl.codegen.emit.c_printer import (
     Printer,
@@ -24,6 +24,7 @@ from softehl.codegen.emit.c_printer import (
 )
 from softehl.codegen.emit.code_motion import If, Loop, Same, Schedule, Statement, flat
 from softehl.codegen.emit.instruction_scheduling import ADDITIONS
+from softehl.codegen.emit.product_loops import ProductLoops
 from softehl.codegen.emit.simd_printer import LanePrinter
 from softehl.codegen.graph.graph import FREE, Input, Node, Op
 from softehl.codegen.graph.traversal import reachable
@@ -125,6 +126,8 @@ class _Group:
         self.p, self.task, self.entries = p, task, entries
         self.widths = widths(p.d, task)
         self.scattered = any(map(along_basis, entries))
+        by_products = any(x.array is not Array.OUTPUT for x in entries)
+        self.products = ProductLoops(p, entries) if by_products else None
         self.stores = _Stores(p, self._targets())
         needed = reachable([x.node for x in entries])
         self.fallible = any(n.op is Op.CALL for n in needed)
@@ -132,7 +135,8 @@ class _Group:
 
     def write(self, plan: Schedule) -> None:
         p = self.p
-        p.read(plan, [x.node for x in self.entries], self.stores.once())
+        stored = [*self.stores.once(), *(self.products.once() if self.products else ())]
+        p.read(plan, [x.node for x in self.entries], stored)
         if self.fallible:
             p.line(1, "M failed = softehl_mask(0);")
         if p.d.term_history:
@@ -140,6 +144,8 @@ class _Group:
             p.line(1, "softehl_terms terms = {0, 0, 0, 0};")
             p.line(1, "(void)terms;")
         self._loads()
+        if self.products:
+            self.products.declare()
         self.stores.start()
         for stage in plan.stages:
             for s in stage.preamble:
@@ -219,6 +225,8 @@ class _Group:
             return []
         flat: dict[str, dict[int, Node]] = {"R": {}, "K": {}}
         for x in self.entries:
+            if x.array is not Array.OUTPUT:
+                continue
             if x.column is None:
                 flat["R"][x.row.position] = x.node
             else:
@@ -248,9 +256,14 @@ class _Group:
                 gather(p, 2, "tp", "t")
             if self.task == abi.Task.FIELDS_RATE:
                 gather(p, 2, "tp", "t", design_width(d))
-        self._body(loop)
+        products = self.products if loop.outputs else None
+        if products:
+            products.start()
+        self._body(loop, products)
         loop_entries = [x for x in self.entries if x.node in loop.outputs]
-        if loop_entries and self.task in abi.AT_POINTS:
+        if products:
+            products.multiply()
+        elif loop_entries and self.task in abi.AT_POINTS:
             self._fields(loop_entries)
         elif loop_entries:
             scatter(p, 2, self.task, loop_entries)
@@ -274,7 +287,7 @@ class _Group:
             p.line(2, f"terms.write = R + {fields_expression(d)} * q + {len(d.fields)};")
             p.line(2, f"terms.write_step = {self.widths['values']};")
 
-    def _body(self, loop: Loop) -> None:
+    def _body(self, loop: Loop, products: ProductLoops | None) -> None:
         """Print the values at a point; each is added to its sum at once, to save storage."""
         p = self.p
         sums: dict[Node, list[Node]] = {}
@@ -293,6 +306,8 @@ class _Group:
             p.block(2, [statement])
             for n in _values(statement):
                 self._add(sums.pop(n, []))
+            if products:
+                products.computed(_values(statement))
 
     def _add(self, sums: Sequence[Node]) -> None:
         for s in sums:
@@ -317,6 +332,8 @@ class _Group:
     def _finish(self) -> None:
         """Write values that do not vary, sums of the basis, and not-a-number after a failure."""
         p = self.p
+        if self.products:
+            self.products.finish()
         fixed = [x for x in self.entries if not x.node.varying]
         if self.task in abi.AT_POINTS and fixed:
             p.line(1, "for (ptrdiff_t q = 0; q < points; ++q) {")

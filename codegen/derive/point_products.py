@@ -1,0 +1,257 @@
+"""Tangent of a large element as a sum over the points of products B^T M B.
+
+The integrand W of a potential sees the unknowns u through few values z (strains, gradients): W(z),
+z(u). With B = dz/du, P = dW/dz and M = dP/dz the tangent is the sum over the points of
+
+    B^T M B + sum over k of P_k d2 z_k / du2 .
+
+Written out entry by entry it is thousands of operations, which take a C compiler minutes. Here
+only B, M and the second term are; loops multiply. The z are the smallest set of values through
+which all ways from the unknowns to W lead (a minimum vertex cut, after Menger), of those that are
+polynomials of degree 1 or 2 in values that do not vary with the point.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from softehl.codegen.derive.output_entries import Array, Entry, Slot
+from softehl.codegen.derive.potential_structure import degrees
+from softehl.codegen.graph.differentiation import Dependence, gradient
+from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.traversal import always, operations, reachable, strip, substitute
+from softehl.codegen.language.definition import Definition
+
+FEW = 12
+"""Unknowns below which an element is never large."""
+VAST = 40_000
+"""Operations of a potential times unknowns from which no other way to a tangent is looked at."""
+LARGE = 8_000
+"""Operations of a tangent, before any pass, up to which it is written out: its C is then compiled
+in some seconds."""
+
+
+def outputs(d: Definition, residual: Sequence[Entry]) -> list[Entry] | None:
+    """Return the residual, B, M and what is added to their products; None where it does not fit.
+
+    Left out are potentials that are no sum of integrals, prescribed derivatives, and models whose
+    integrand sees sums over points or more values than there are unknowns.
+    """
+    g = d.graph
+    split = _split(d)
+    if split is None or d.prescribed or d.interpolated or any(u.varying for u in d.directions):
+        return None
+    rest = split[1]
+    (integrand,), frozen = strip(g, [split[0]], d.constant)
+    values = _values(d, integrand, set(frozen.values()))
+    if values is None:
+        return None
+    places = [g.input("value at a point", k, varying=True) for k in range(len(values))]
+    back = dict(zip(places, values, strict=True))
+    (inside,), images = substitute(g, [integrand], dict(zip(values, places, strict=True)))
+    constant = {images[c] for c in frozen.values() if c in images}
+    free = [p for p in places if p not in constant]
+    first = gradient(g, inside, free, constant=constant, flat=True)
+    fluxes = {p: first[p] for p in free}
+    moduli = [gradient(g, fluxes[p], places, flat=True) if p in fluxes else {} for p in places]
+    size = range(len(values))
+    pairs = [(i, j) for i in size for j in size if not (d.conservative and j > i)]
+    chosen = {
+        (i, j): moduli[i][places[j]]
+        for i, j in pairs
+        if moduli[i].get(places[j], g.zero) is not g.zero
+    }
+    slopes = [gradient(g, z, d.directions, flat=True) for z in values]
+    curved = _curvature(d, values, {z: fluxes[p] for p, z in back.items() if p in fluxes})
+    made = [*chosen.values(), *curved.values()]
+    new, _ = substitute(g, made, back)
+    at = iter(new)
+    entries = [*residual]
+    entries += [Entry(Slot(False, i), Slot(False, j), next(at), Array.MODULI) for i, j in chosen]
+    entries += [Entry(Slot(False, i), Slot(False, j), next(at), Array.ADDED) for i, j in curved]
+    entries += [
+        Entry(Slot(False, k), Slot(False, j), row[u], Array.SLOPES)
+        for k, row in enumerate(slopes)
+        for j, u in enumerate(d.directions)
+        if row[u] is not g.zero
+    ]
+    return entries + _fixed(d, rest)
+
+
+def is_vast(d: Definition) -> bool:
+    """True if a tangent would be so long that it takes long to write it out at all."""
+    return operations([d.potential]) * len(d.unknowns) > VAST
+
+
+def is_large(tangent: Sequence[Entry]) -> bool:
+    """True if a tangent that is written out entry by entry is long."""
+    return operations([x.node for x in tangent]) > LARGE
+
+
+def _split(d: Definition) -> tuple[Node, Node] | None:
+    """Integrand of a potential that is one integral plus a value without any; None: another one."""
+    g, fixed = d.graph, Dependence(tuple(d.directions))
+    integrand, rest = g.zero, g.zero
+    stack = [(d.potential, g.one)]
+    while stack:
+        n, factor = stack.pop()
+        match n.op:
+            case Op.NAME if n not in d.constant:
+                stack.append((n.args[0], factor))
+            case Op.ADD | Op.SUB:
+                sign = factor if n.op is Op.ADD else g.neg(factor)
+                stack += [(n.args[1], sign), (n.args[0], factor)]
+            case Op.NEG:
+                stack.append((n.args[0], g.neg(factor)))
+            case Op.MUL if not (fixed(n.args[0]) and fixed(n.args[1])) and fixed(n):
+                a, b = n.args if fixed(n.args[1]) else tuple(reversed(n.args))
+                stack.append((b, g.mul(factor, a)))
+            case Op.SUM:
+                integrand = g.add(integrand, g.mul(factor, n.args[0]))
+            case _:
+                if any(m.op is Op.SUM for m in reachable([n])) and fixed(n):
+                    return None
+                rest = g.add(rest, g.mul(factor, n))
+    return None if integrand is g.zero else (integrand, rest)
+
+
+def _values(d: Definition, integrand: Node, constant: set[Node]) -> list[Node] | None:
+    """The fewest values through which the integrand sees the unknowns, or None."""
+    depends, frozen = Dependence(tuple(d.directions)), Dependence(tuple(constant))
+    nodes = reachable([integrand])
+    base = [n for n in nodes if not n.varying and depends(n)]
+    degree = degrees([integrand], base, ())
+    certain = set(always([integrand], conditions=False))
+
+    def allowed(limit: int) -> set[Node]:
+        return {
+            n
+            for n in certain
+            if depends(n)
+            and degree[n] <= limit
+            and n is not integrand
+            and (n in constant or not frozen(n))
+            and not any(m.op is Op.SUM for m in (n, *n.args))
+        }
+
+    users = [n for n in nodes if depends(n)]
+    linear = _cut(users, integrand, allowed(1), len(d.unknowns))
+    curved = None
+    if degree[integrand] > 2:
+        curved = _cut(users, integrand, allowed(2), len(d.unknowns) if not linear else len(linear))
+    chosen = curved if curved and (not linear or 2 * len(curved) <= len(linear)) else linear
+    if not chosen or any(m.op is Op.SUM for m in reachable(chosen)):
+        return None
+    return sorted(chosen, key=lambda n: n.id)
+
+
+def _cut(users: Sequence[Node], end: Node, allowed: set[Node], most: int) -> list[Node] | None:
+    """Smallest set of allowed nodes that every way from an unknown to `end` meets, nearest to the
+    unknowns; None if it has more than `most` nodes.
+
+    Each augmenting path raises the flow through the nodes by one; a node is met at its entry (its
+    number times 2) and left at its exit.
+    """
+    number = {n: k for k, n in enumerate(users)}
+    last = 2 * number[end] + 1
+    capacity: dict[int, dict[int, int]] = {}
+    infinite = most + 1
+
+    def joined(a: int, b: int, c: int) -> None:
+        capacity.setdefault(a, {})[b] = c
+        capacity.setdefault(b, {}).setdefault(a, 0)
+
+    for n, k in number.items():
+        joined(2 * k, 2 * k + 1, 1 if n in allowed else infinite)
+        below = [number[a] for a in dict.fromkeys(n.args) if a in number]
+        for a in below:
+            joined(2 * a + 1, 2 * k, infinite)
+        if not below:
+            joined(-1, 2 * k, infinite)
+    for _ in range(most + 1):
+        before = _way(capacity, last)
+        if last not in before:
+            return [n for n, k in number.items() if 2 * k in before and 2 * k + 1 not in before]
+        at = last
+        while at != -1:
+            previous = before[at]
+            capacity[previous][at] -= 1
+            capacity[at][previous] += 1
+            at = previous
+    return None
+
+
+def _way(capacity: Mapping[int, Mapping[int, int]], last: int) -> dict[int, int]:
+    """Where each place that can be reached comes from, breadth first."""
+    before = {-1: -1}
+    waiting = deque([-1])
+    while waiting and last not in before:
+        at = waiting.popleft()
+        for to, left in capacity[at].items():
+            if left > 0 and to not in before:
+                before[to] = at
+                waiting.append(to)
+    return before
+
+
+def _curvature(
+    d: Definition, values: Sequence[Node], fluxes: Mapping[Node, Node]
+) -> dict[tuple[int, int], Node]:
+    """Lower triangle of the sum of fluxes times second derivatives of the values."""
+    g = d.graph
+    frozen = {z: g.input("flux at a point", k, varying=True) for k, z in enumerate(values)}
+    total = g.zero
+    for z in values:
+        if z in fluxes:
+            total = g.add(total, g.mul(frozen[z], z))
+    lower = _hessian(g, total, d.directions)
+    back = {frozen[z]: flux for z, flux in fluxes.items()}
+    new, _ = substitute(g, list(lower.values()), back)
+    return dict(zip(lower, new, strict=True))
+
+
+def _hessian(g: Graph, value: Node, unknowns: Sequence[Node]) -> dict[tuple[int, int], Node]:
+    """Lower triangle of the second derivatives of a value, without zeros."""
+    rows = gradient(g, value, unknowns, flat=True)
+    lower = {}
+    for i, u in enumerate(unknowns):
+        row = gradient(g, rows[u], unknowns[: i + 1], flat=True)
+        lower.update({(i, j): row[v] for j, v in enumerate(unknowns[: i + 1])})
+    return {at: n for at, n in lower.items() if n is not g.zero}
+
+
+def _fixed(d: Definition, rest: Node) -> list[Entry]:
+    """Second derivatives of what is no integral."""
+    g = d.graph
+    rows = gradient(g, rest, d.directions, constant=d.constant)
+    entries = []
+    for i, u in enumerate(d.directions):
+        row = gradient(g, rows[u], d.directions) if rows[u] is not g.zero else {}
+        entries += [
+            Entry(Slot(False, i), Slot(False, j), row[v], Array.ADDED)
+            for j, v in enumerate(d.directions)
+            if row.get(v, g.zero) is not g.zero and not (d.conservative and j > i)
+        ]
+    return entries
+
+
+@dataclass(frozen=True)
+class Block:
+    """Values at a point that depend on the same unknowns: rows of B with the same columns."""
+
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+
+
+def blocks(entries: Sequence[Entry]) -> list[Block]:
+    """Rows of B, those of the same columns together."""
+    columns: dict[int, list[int]] = {}
+    for x in entries:
+        if x.array is Array.SLOPES and x.column is not None:
+            columns.setdefault(x.row.position, []).append(x.column.position)
+    rows: dict[tuple[int, ...], list[int]] = {}
+    for row, some in columns.items():
+        rows.setdefault(tuple(some), []).append(row)
+    return [Block(tuple(k), some) for some, k in rows.items()]
