@@ -86,6 +86,27 @@ def test_derivatives_against_mpmath(source: str, order: int) -> None:
                 assert abs(found - expected) <= 4e-15 * max(1, abs(expected))
 
 
+def test_calls_of_several_functions() -> None:
+    """One function at two places, and another one of the same name, in one kernel."""
+    m = Model("several", nodes=1, rule=quadrature.point_rule())
+    u = m.unknown("u")
+    first = m.external("law", [u, 2], source=LAW, derivatives=2)
+    second = m.external("again", [2, u], source=LAW, derivatives=2, function="law")
+    more = BY_STEPS.replace("+ d * d * d", "+ d * d * d + e * e").replace(
+        "(1 + e * d)", "(1 + e * d) + 2 * e"
+    )
+    third = m.external("other", [u, 1], source=more, derivatives=1, function="law")
+    m.potential(first + 3 * second + 5 * third)
+    kernel = softehl.load_kernel(m.finish())
+    R, K = kernel.tangent(np.empty((1, 0)), np.array([[0.3]]))
+    with mpmath.workdps(40):
+        energy = lambda u: exact(u, 2) + 3 * exact(2, u) + 5 * (exact(u, 1) + u**2)  # noqa: E731
+        assert R[0, 0] == pytest.approx(float(mpmath.diff(energy, mpmath.mpf(0.3))), rel=1e-14)
+        assert K[0, 0, 0] == pytest.approx(
+            float(mpmath.diff(energy, mpmath.mpf(0.3), 2)), rel=1e-14
+        )
+
+
 def test_where_it_has_no_value_the_element_is_not_a_number() -> None:
     kernel = softehl.load_kernel(spring(LAW, 2))
     R = kernel.residual(np.empty((3, 0)), np.array([[0.1], [3.1], [0.2]]), parameters=[0.1])

@@ -80,7 +80,7 @@ class Law:
 
     def constants(self, stress: float = 1.0) -> dict[str, Any]:
         """Arguments of `Study.add` in another unit of stress."""
-        pure = {"nu", "alpha_1", "alpha_2", "alpha_3", "W", "U"}
+        pure = {"nu", "alpha_1", "alpha_2", "alpha_3", "W", "U", "share", "rate"}
         return {n: v if n in pure else stress * v for n, v in self.given.items()}
 
     def add(
@@ -134,6 +134,9 @@ LAWS = {
     "ogden": Law({**_OGDEN, "kappa": 0.9}, material="ogden", parameter="mu_1"),
     "hooke": Law({"E": 1.0, "nu": 0.3}, material="hooke", small=True, parameter="E"),
     "learned": Law(_LEARNED, pages.learned),
+    "softened": Law(
+        {**_RUBBER, "share": [0.6, 0.4], "rate": [0.5, 2.0]}, material=pages.softened, history=True
+    ),
     "mixed": Law(_MIXED, pages.mixed),
     "condensed": Law(_MIXED, pages.condensed),
     "taylor-hood": Law(_MIXED, pages.taylor_hood),

@@ -71,6 +71,33 @@ def stress_law(m):
     m.stress(rubber_stress(m.F, J, *m.parameters(**RUBBER)))
 
 
+PRESSURE = """
+#include <complex.h>
+/* Derivative of lame / 2 log(J)^2 by x = J, lame. */
+int pressure(const double complex *x, double complex *y, double complex *dy, double complex *ddy)
+{
+    y[0] = x[1] * clog(x[0]) / x[0];
+    return 0;
+}
+"""
+
+
+@softehl.material
+def softened(m):
+    """The body softens for good where it was stretched: several parts, each with history."""
+    mu, lame = m.parameters(**RUBBER)
+    share, rate = m.array("share"), m.array("rate")
+    top = m.point_array("top", share, "largest energy so far")
+    F = m.F
+    J = m.define("J", F.det())
+    energy = m.define("energy", ((F.T * F).trace() - 3 - 2 * sp.log(J)) / 2)
+    left = m.sum(share, rate, top, lambda s, r, top: s * sp.exp(-r * sp.Max(top, energy)))
+    inverse = F.adjugate().T / J
+    p = m.external("pressure", [J, lame], source=PRESSURE)
+    m.stress(mu * left * (F - inverse) + p * J * inverse)
+    m.history(top=m.each(top, lambda top: sp.Max(top, energy)))
+
+
 @softehl.material
 def energy_law(m):
     """The body by the energy of its material."""
