@@ -157,3 +157,105 @@ BENCHMARKS.append(
         slow=True,
     )
 )
+
+
+def constant_rate() -> float:
+    """Stress after 2 % at 0.01 / s, without hardening."""
+    data = {"E": 2e5, "nu": 0.3, "sy": 200.0, "H": 0.0, "n": 5.0, "rate_0": 10.0}
+    return stress_path("perzyna", np.linspace(0, 0.02, 41)[1:].tolist(), dt=0.05, **data)[-1]
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "perzyna",
+        "2 % at a rate of 0.01 / s, n = 5: stress [MPa], sy (1 + (rate / rate_0)^(1 / n))",
+        200.0 * (1 + (0.01 / 10.0) ** 0.2),
+        1e-6,
+        "closed form",
+        constant_rate,
+    )
+)
+
+SOIL = {"E": 1e4, "nu": 0.25, "a": 0.6, "a_flow": 0.3, "k": 2.0}
+
+for sign, word in ((1, "tension"), (-1, "compression")):
+    BENCHMARKS.append(
+        Benchmark(
+            "drucker_prager",
+            f"flow in {word}, a = 0.6, k = 2: stress [MPa], k / (1 / sqrt(3) +- a / 3)",
+            sign * 2.0 / (1 / np.sqrt(3) + sign * 0.2),
+            1e-9,
+            "closed form",
+            lambda sign=sign: stress_path(  # type: ignore[misc]
+                "drucker_prager", [sign * 2e-4 * k for k in range(1, 6)], **SOIL
+            )[-1],
+        )
+    )
+
+SHEET = {"E": 7e4, "nu": 0.3, "sy": 100.0, "H": 0.0}
+RATIOS = {"r_xx": 1.2, "r_yy": 0.9, "r_zz": 1.0, "r_xy": 1.1, "r_yz": 1.0, "r_xz": 1.0}
+
+
+def hill_in_shear() -> float:
+    """Shear stress of a block in simple shear in the x-y plane."""
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
+    study.add("block", material="hill", **SHEET, **RATIOS)
+    study.fix("boundary", u_x=lambda x, t: 0.01 * t * x[:, 1], u_y=0, u_z=0)
+    return float(study.solve(steps=5).fields("block")["sigma_xy"].mean())
+
+
+BENCHMARKS += [
+    Benchmark(
+        "hill",
+        "flow along x, ratio 1.2, sy = 100: stress [MPa]",
+        120.0,
+        1e-8,
+        "closed form",
+        lambda: stress_path("hill", [0.001, 0.003, 0.01], **SHEET, **RATIOS)[-1],
+    ),
+    Benchmark(
+        "hill",
+        "flow in shear, ratio 1.1, sy = 100: stress [MPa], 110 / sqrt(3)",
+        110.0 / np.sqrt(3),
+        1e-8,
+        "closed form",
+        hill_in_shear,
+    ),
+]
+
+ARTERY = {"mu": 0.01, "k1": 0.5, "k2": 5.0, "dispersion": 0.2, "angle": np.pi / 4}
+
+
+def artery() -> float:
+    """Cauchy stress of a sheet at stretches 1.1 along x and y."""
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
+    study.add("sheet", material="hgo", kappa=1e5, **ARTERY)
+    study.fix("left", u_x=0)
+    study.fix("front", u_y=0)
+    study.fix("bottom", u_z=0)
+    study.fix("right", u_x=0.1)
+    study.fix("back", u_y=0.1)
+    return float(study.solve(steps=5).fields("sheet")["sigma_xx"].mean())
+
+
+def _artery() -> float:
+    """Incompressible: sigma = l dW/dl / 2 of both stretches l together."""
+    mu, k1, k2, d = (ARTERY[k] for k in ("mu", "k1", "k2", "dispersion"))
+    a = 1.1
+    I1, rate = 2 * a**2 + a**-4, 4 * a - 4 * a**-5
+    strain = d * (I1 - 3) + (1 - 3 * d) * (a**2 - 1)
+    slope = d * rate + (1 - 3 * d) * 2 * a
+    W = mu / 2 * rate + 2 * k1 * strain * np.exp(k2 * strain**2) * slope
+    return float(a * W / 2)
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "hgo",
+        "incompressible sheet, fibres at 45 degrees, stretches 1.1: stress [MPa]",
+        _artery(),
+        1e-5,
+        "closed form",
+        artery,
+    )
+)
