@@ -10,8 +10,7 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.contact.body_thickness import inner_radii, thickness
 from softehl.runtime.contact.mortar_pair import MortarPairKernel
-from softehl.runtime.contact.search import Contact, ContactSide, StateDependentBlocks
-from softehl.runtime.contact.search_3d import FaceContact
+from softehl.runtime.contact.search import Contact, ContactSide, FaceContact, StateDependentBlocks
 from softehl.runtime.definition.contact_sides import MULTIPLIERS, ContactRequest
 from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.discretisation.dofmap import Numbering
