@@ -13,7 +13,9 @@ import shutil
 import stat
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -169,21 +171,24 @@ def test_a_file_of_the_users_folder_is_not_taken_for_one_of_python(
 # --------------------------------------------------------------------- what is wrong is one line
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ('cc "x', r"""CC='cc "x' is no command (no closing quotation)"""),
-        ("no-such-compiler", "no C compiler: 'no-such-compiler' is not on the PATH"),
-        ("true", "true does not answer as a C compiler does (exit code 0: nothing)"),
-        ("ls", "ls does not answer as a C compiler does (exit code 2: "),
-        ("{here}/text", "text cannot be run (Exec format error): set CC to a C compiler"),
-        ("{here}/broken", "the C compiler failed (7)"),
-        ("{here}/idle", "idle is no C compiler (it wrote nothing): set CC to one"),
-    ],
-)
-def test_a_compiler_that_cannot_be_used(
-    wheel: Path, tmp_path: Path, command: str, words: str
-) -> None:
+COMPILERS = {
+    "no-such-compiler": "no C compiler: 'no-such-compiler' is not on the PATH",
+    "{here}/broken": "the C compiler failed (7)",
+    'cc "x': r"""CC='cc "x' is no command (no closing quotation)""",
+    "true": "true does not answer as a C compiler does (exit code 0: nothing)",
+    "ls": "ls does not answer as a C compiler does (exit code 2: ",
+    "{here}/text": "text cannot be run (Exec format error): set CC to a C compiler",
+    "{here}/idle": "idle is no C compiler (it wrote nothing): set CC to one",
+}
+
+
+def first(values: Iterable[str], count: int) -> list[Any]:
+    """Values of a parameter, of which all but the first ones are slow: each is a new process."""
+    return [pytest.param(v, marks=[pytest.mark.slow] * (k >= count)) for k, v in enumerate(values)]
+
+
+@pytest.mark.parametrize("command", first(COMPILERS, 2))
+def test_a_compiler_that_cannot_be_used(wheel: Path, tmp_path: Path, command: str) -> None:
     asked = f'case "$*" in *-dM*) exec {shutil.which("cc")} "$@";; esac'
     scripts = {
         "text": "neither a script nor a program\n",
@@ -196,7 +201,7 @@ def test_a_compiler_that_cannot_be_used(
     kind, _, said = used(using(wheel, CC=command.format(here=tmp_path)))
     assert kind == "plain"
     assert said.startswith("softehl: the plain kernels are used: ")
-    assert words in said
+    assert COMPILERS[command] in said
     assert len(said.splitlines()) == 1
 
 
@@ -208,7 +213,7 @@ def test_a_cache_that_cannot_be_written(wheel: Path, tmp_path: Path) -> None:
     assert len(said.splitlines()) == 1
 
 
-@pytest.mark.parametrize("inside", ["", "built"])
+@pytest.mark.parametrize("inside", first(("built", ""), 1))
 def test_a_cache_that_others_may_write_to_is_not_loaded_from(
     wheel: Path, cache: Path, inside: str
 ) -> None:
@@ -282,13 +287,14 @@ def damage(folder: Path, kind: str, other: Path) -> None:
 
 
 DAMAGES = (
-    *("a flipped bit", "truncated", "empty", "text", "gone", "a folder", "of other sources"),
-    *("digest gone", "digest no text", "unreadable", "entry is a file"),
+    *("a flipped bit", "digest gone", "truncated", "empty", "text", "gone", "a folder"),
+    *("of other sources", "digest no text", "unreadable", "entry is a file"),
     "others may write to it",
 )
 
 
-def test_a_damaged_entry_is_built_anew(wheel: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", first(DAMAGES, 2))
+def test_a_damaged_entry_is_built_anew(wheel: Path, tmp_path: Path, kind: str) -> None:
     _, path, _ = used(using(wheel))
     whole = path.read_bytes()
     (tmp_path / "other").mkdir()
@@ -296,12 +302,11 @@ def test_a_damaged_entry_is_built_anew(wheel: Path, tmp_path: Path) -> None:
         "const char *softehl_signature(void) { return SOFTEHL_SIGNATURE; }\n"
     )
     build.build(tmp_path / "other")
-    for kind in DAMAGES:
-        damage(path.parent, kind, tmp_path / "other")
-        assert used(using(wheel)) == ("tuned", path, ""), kind
-        assert len(path.read_bytes()) == len(whole), kind
-        assert build.is_intact(path.parent), kind
-        assert stat.S_IMODE(path.parent.stat().st_mode) & 0o022 == 0, kind
+    damage(path.parent, kind, tmp_path / "other")
+    assert used(using(wheel)) == ("tuned", path, "")
+    assert len(path.read_bytes()) == len(whole)
+    assert build.is_intact(path.parent)
+    assert stat.S_IMODE(path.parent.stat().st_mode) & 0o022 == 0
 
 
 def test_a_damaged_plain_library_is_refused_and_not_loaded(
