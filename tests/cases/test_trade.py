@@ -49,14 +49,6 @@ def typed(*assignments: str) -> Seal:
     return parameters
 
 
-@pytest.mark.parametrize(
-    "name", ["36x4", "36x4 ISO 3601", "DIN 3771 36x4", "DIN 3771 36 x 4", "O-ring 36x4 ISO 3601-1"]
-)
-def test_a_metric_ring_with_its_standard_before_or_behind(name: str) -> None:
-    p = typed(f"ring={name}", *GLAND)
-    assert (p.inner_diameter, p.section_diameter) == (36.0, 4.0)
-
-
 @pytest.mark.parametrize("key", ["shore_A", "material", "compound"])
 def test_a_rubber_by_polymer_and_hardness(key: str) -> None:
     p = typed(f"{key}=NBR 70")
