@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 from softehl.codegen.graph.graph import Graph, Node, Routine
+from softehl.codegen.graph.partial_derivatives import DifferentiationError
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,6 +19,12 @@ class Bessel(Routine):
     """S_n of the length of its operands."""
 
     order: int
+
+    def divided(self, between: Any, call: Node) -> list[Node]:
+        raise DifferentiationError(
+            "m.sinc, m.cosc and m.rotation have no divided differences: they may not be functions "
+            "of an eigenvalue"
+        )
 
     def partials(self, g: Graph, item: Node) -> list[tuple[Node, Node]]:
         args = item.args[0].args

@@ -38,6 +38,10 @@ class TensorFunctions:
     def isotropic(self, what: str, C: Any, f: Callable[[Any], Any]) -> Any:
         """Names of the sum of f(c_a) n_a n_a over eigenvalues and vectors of a symmetric matrix."""
         symbols = self._symbols
+        if not callable(f):
+            raise ModelError(
+                f"m.{what}: {f} is no function; write `lambda x: ...` of an eigenvalue"
+            )
         size, entries = symmetric_entries(symbols, f"m.{what}", C)
         label = self._label(what)
         local = Entries(placeholders(1, real=True), ("",), list)
@@ -64,7 +68,7 @@ class TensorFunctions:
         """Names of the exponential of a matrix, symmetric or not."""
         symbols, shape = self._symbols, getattr(A, "shape", None)
         if shape not in ((2, 2), (3, 3)):
-            raise ModelError(f"m.exp: {_shape(A)}, must be (2, 2) or (3, 3); of a scalar sp.exp")
+            raise ModelError(f"m.exp: {_wrong_shape(A, '(2, 2) or (3, 3)')}")
         size = shape[0]
         nodes = [symbols.lower(a) for a in A]
         if all(alike(nodes[size * i + j], nodes[size * j + i]) for i, j in entry_pairs(size)):
@@ -119,7 +123,7 @@ def symmetric_entries(
     """
     if getattr(C, "shape", None) not in [(n, n) for n in sizes]:
         allowed = " or ".join(f"({n}, {n})" for n in sizes)
-        raise ModelError(f"{name}: {_shape(C)}, must be {allowed}")
+        raise ModelError(f"{name}: {_wrong_shape(C, allowed)}")
     size, entries = C.shape[0], []
     for i, j in entry_pairs(size):
         upper, lower = symbols.lower(C[i, j]), symbols.lower(C[j, i])
@@ -132,5 +136,10 @@ def symmetric_entries(
     return size, entries
 
 
-def _shape(C: Any) -> str:
-    return f"C has shape {getattr(C, 'shape', 'that of a scalar or list')}"
+def _wrong_shape(C: Any, allowed: str) -> str:
+    shape = getattr(C, "shape", None)
+    if shape is not None:
+        return f"C has shape {shape}, must be {allowed}"
+    if isinstance(C, (list, tuple)):
+        return f"C is a list, must be a matrix {allowed}: write sp.Matrix({C})"
+    return f"{C} is a scalar, must be a matrix {allowed}; sp.log, sp.exp, ... are those of scalars"

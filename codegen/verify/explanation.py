@@ -19,6 +19,7 @@ from softehl.codegen.graph.evaluation import State, Walk
 from softehl.codegen.graph.graph import BOOLEAN, Input, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.routines import Newton
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine
+from softehl.codegen.graph.tensor_functions import TensorRoutine
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 
@@ -173,6 +174,8 @@ class _Evaluation:
             array = self.d.arrays[n.args[0].payload.array].name
             at = ", ".join(args)
             return f"{array} has no value{point}, {at}{self._line(n)}"
+        if n.op is Op.ITEM and isinstance(n.args[0].payload, TensorRoutine):
+            return f"{n.args[0].payload.function.what} has no value{point}{self._line(n)}"
         if n.op is Op.ITEM and isinstance(n.args[0].payload, Routine):
             return f"{n.args[0].payload.name} has no solution{point}{self._line(n)}"
         shown = {_text(a, names, 1): self.value(a, q) for a in n.args if a.op is not Op.CONST}

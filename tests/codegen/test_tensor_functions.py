@@ -373,9 +373,13 @@ def test_mistakes() -> None:
         m.log(sp.Matrix([[a, b]]))
     with pytest.raises(ModelError, match=r"m.sqrt: C is not symmetric, C\[0, 1\] is not C\[1, 0\]"):
         m.sqrt(sp.Matrix([[a, b], [a, b]]))
-    with pytest.raises(ModelError, match=r"m.exp: .* that of a scalar or list.*of a scalar sp.exp"):
+    with pytest.raises(ModelError, match=r"m.exp: a is a scalar, must be a matrix \(2, 2\) or"):
         m.exp(a)
+    with pytest.raises(ModelError, match=r"m.eigenvalues: C is a list.* write sp.Matrix"):
+        m.eigenvalues([[a, b], [b, a]])
     C = sp.Matrix([[a, b], [b, a]])
+    with pytest.raises(ModelError, match=r"m.isotropic: .* is no function; write `lambda x:"):
+        m.isotropic(C, sp.Max(a, 0))  # type: ignore[arg-type]
     with pytest.raises(ModelError, match=r"m.isotropic: atan2 has no second divided difference"):
         m.isotropic(C, lambda x: sp.atan2(x, a))
     with pytest.raises(ModelError, match="holds a function of another tensor"):
