@@ -16,6 +16,7 @@ import importlib
 import os
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -112,12 +113,17 @@ def jax_calls(X: Array, u: Array, weights: Any) -> dict[str, Callable[[], Any]]:
     def by_element(u: Any, X: Any) -> tuple[Any, Any]:
         return jax.grad(element)(u, X), jax.hessian(element)(u, X)
 
-    calls = {}
+    calls: dict[str, Callable[[], Any]] = {}
     for name, function in (("JAX, hessian", by_element), ("JAX, moduli", by_points)):
         jitted = jax.jit(jax.vmap(function))
         arrays = jnp.asarray(u), jnp.asarray(X)
-        calls[name] = lambda f=jitted, a=arrays: jax.block_until_ready(f(*a))
+        calls[name] = partial(_finished, jax, jitted, arrays)
     return calls
+
+
+def _finished(jax: Any, function: Callable[..., Any], arrays: Sequence[Any]) -> Any:
+    """Results that are computed, not only asked for."""
+    return jax.block_until_ready(function(*arrays))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -20,7 +20,7 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 from softehl.codegen.graph.divided_difference import Divided
-from softehl.codegen.graph.graph import Graph, Node, Routine
+from softehl.codegen.graph.graph import Graph, Node, ResultIndex, Routine
 from softehl.codegen.graph.guarded_products import guarded
 from softehl.codegen.graph.partial_derivatives import DifferentiationError, Partials
 
@@ -364,4 +364,5 @@ def network(name: str, array: int, layout: NetworkLayout) -> Network:
 
 
 def _index(item: Node) -> int:
-    return item.payload.index  # type: ignore[union-attr]
+    assert isinstance(item.payload, ResultIndex)
+    return item.payload.index

@@ -108,11 +108,11 @@ def argument_rows(
     for label, arguments in groups.items():
         for k, a in enumerate(arguments):
             yield f"{entry.format(label, k + base)}  {a.name}: {a.meaning}"
-    for k, a in enumerate(d.arrays):
+    for k, array in enumerate(d.arrays):
         first = len(d.parameters) + ARRAY_ENTRIES * k + base
         places = ", ".join(entry.format("p", first + i) for i in range(ARRAY_ENTRIES))
-        yield f"{places}  place in p and length of {a.name}, and 0; {a.meaning}:"
-        yield f"    {a.layout.content}"
+        yield f"{places}  place in p and length of {array.name}, and 0; {array.meaning}:"
+        yield f"    {array.layout.content}"
     for k, (name, _) in enumerate(d.fields):
         yield f"{entry.format('fields', k + base)}  {name}"
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 
-from softehl.codegen.abi import Task
+from softehl.codegen.abi import ARRAY_ENTRIES, Task
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
@@ -14,6 +14,7 @@ from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.material_response import at_one_point
 from softehl.codegen.hosts.registry import Host
 from softehl.codegen.hosts.test_states import Sample, samples
+from softehl.codegen.verify.kernel_batch import parameters_of
 
 
 def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
@@ -44,7 +45,7 @@ def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, st
     return texts
 
 
-JAX = Host(element=module, material=at_one_point(module))
+JAX = Host(element=module, material=at_one_point(module), arrays=True)
 
 
 def with_derivatives(interface: ElementInterface) -> ElementInterface:
@@ -104,6 +105,9 @@ def _substitutions(interface: ElementInterface, first: Sample) -> dict[str, obje
         "points": sizes["POINTS"],
         "field_count": sizes["FIELDS"],
         "parameter_names": {a.name: a.meaning for a in d.parameters},
+        "array_names": tuple(a.name for a in d.arrays),
+        "array_entries": ARRAY_ENTRIES * len(d.arrays),
+        "has_arrays": str(bool(d.arrays)).lower(),
         "data_names": {a.name: a.meaning for a in d.data},
         "unknown_names": tuple(d.unknowns),
         "field_names": tuple(name for name, _ in d.fields),
@@ -122,7 +126,7 @@ def _sample_file(references: Sequence[Sample]) -> str:
         "X": [list(map(float, s.state.coordinates)) for s in references],
         "u": [list(map(float, s.state.dofs)) for s in references],
         "data": [s.data for s in references],
-        "p": list(map(float, references[0].state.parameters)),
+        "p": parameters_of(references[0].state),
         "energy": [v for s in references for v in s.energy],
         "residual": [s.residual for s in references],
         "tangent": [[s.tangent[k : k + size] for k in range(0, size**2, size)] for s in references],

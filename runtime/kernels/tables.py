@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels.run_time_arrays import ArrayDataError, RunTimeArray
@@ -16,7 +17,7 @@ OUTSIDE = ("constant", "linear", "error")
 ENDS = ("not-a-knot", "natural")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Table:
     """Points of a curve that a page calls by `m.table`, and what lies between and outside them.
 
@@ -52,18 +53,25 @@ class Table:
     outside: str | None = None
     ends: str = "not-a-knot"
 
-    def __post_init__(self) -> None:
-        for name, values, allowed in (
-            ("interpolation", self.interpolation, (None, *INTERPOLATIONS)),
-            ("outside", self.outside, (None, *OUTSIDE)),
-            ("ends", self.ends, ENDS),
+    def __init__(
+        self,
+        x: ArrayLike,
+        y: ArrayLike,
+        interpolation: str | None = None,
+        outside: str | None = None,
+        ends: str = "not-a-knot",
+    ) -> None:
+        for name, value, allowed in (
+            ("interpolation", interpolation, (None, *INTERPOLATIONS)),
+            ("outside", outside, (None, *OUTSIDE)),
+            ("ends", ends, ENDS),
         ):
-            if values not in allowed:
+            if value not in allowed:
                 names = ", ".join(repr(a) for a in allowed if a)
-                raise ArrayDataError(f"Table: {name} = {values!r}; allowed: {names}")
-        x, y = _points(self.x, self.y)
-        object.__setattr__(self, "x", x)
-        object.__setattr__(self, "y", y)
+                raise ArrayDataError(f"Table: {name} = {value!r}; allowed: {names}")
+            object.__setattr__(self, name, value)
+        for name, numbers in zip("xy", _points(x, y), strict=True):
+            object.__setattr__(self, name, numbers)
 
     def __repr__(self) -> str:
         """Summary in one line."""
@@ -150,7 +158,8 @@ class Table:
         """Slopes at the points (m,), of a line in the sense of its last interval, and rates."""
         if self.interpolation == "spline":
             A, B = _spline_equations(h, natural=self.ends == "natural")
-            return np.linalg.solve(A, B @ y), np.linalg.solve(A, B @ dy)
+            values, rates = np.linalg.solve(A, B @ y), np.linalg.solve(A, B @ dy)
+            return np.asarray(values, np.float64), np.asarray(rates, np.float64)
         secants, d_secants = np.diff(y) / h, np.diff(dy, axis=0) / h[:, None]
         if self.interpolation == "pchip":
             return _pchip(h, secants, d_secants)
@@ -282,7 +291,7 @@ def table_of(array: RunTimeArray, given: Any) -> Table:
     if isinstance(given, Table):
         curve = given
     elif isinstance(given, (tuple, list)) and len(given) == 2:
-        curve = Table(cast(Array, given[0]), cast(Array, given[1]))
+        curve = Table(given[0], given[1])
     else:
         raise ArrayDataError(
             "a curve is needed, as in "

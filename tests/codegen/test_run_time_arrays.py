@@ -116,6 +116,9 @@ def test_a_curve_ends_in_the_chosen_way(table: Kernel) -> None:
     assert energies["linear"].tolist() == [0, 1, 4, 6]
     assert np.isnan(energies["error"]).tolist() == [True, False, False, True]
     assert energies["error"][1:3].tolist() == [1, 4]
+    line = {"k": Table([0, 1, 2], [1, 2, 4], "linear")}
+    slopes = table.residual(np.empty((3, 0)), np.array([[0.0], [1.0], [2.0]]), parameters=line)
+    assert slopes.ravel().tolist() == [1, 2, 2]  # at a point that of the interval on its right
 
 
 def test_tables_interpolate_as_scipy_does() -> None:
@@ -149,7 +152,7 @@ def test_weights_come_as_lists_pytorch_and_flax_have_them(network: Kernel) -> No
     """One network in four forms; its slopes are those of an evaluation in 50 digits."""
     rng = np.random.default_rng(2)
     layers = [(rng.normal(size=s), rng.normal(size=s[0])) for s in ((3, 2), (2, 3), (1, 2))]
-    torch = {}
+    torch: dict[str, Any] = {}
     for k, (W, b) in enumerate(layers):
         torch |= {f"{2 * k}.weight": W, f"{2 * k}.bias": b}
     flax = {"params": {f"Dense_{k}": {"kernel": W.T, "bias": b} for k, (W, b) in enumerate(layers)}}

@@ -51,7 +51,7 @@ FOLDERS = "cases|codegen|runtime|tests|docs|generated|src"
 WANTED = {
     *("cell", "time integrator", "linear solver", "constraint", "mesh format", "contact law"),
     *("input of sensitivities", "material", "term of the film", "column of `curve.csv`"),
-    *("section", "pass of the compiler", "host", "case"),
+    *("section", "pass of the compiler", "host", "case", "kind of run-time array"),
 }
 
 

@@ -11,7 +11,8 @@ using Result = ffi::ResultBuffer<ffi::F64>;
 namespace {
 
 constexpr std::size_t kX = @NAME@_NODES * @NAME@_DIMENSION, kU = @NAME@_UNKNOWNS;
-constexpr std::size_t kP = @NAME@_PARAMETERS;
+constexpr std::size_t kP = @NAME@_PARAMETERS + @array_entries@;
+constexpr bool kArrays = @has_arrays@;  // of any length, behind the first kP numbers of p
 constexpr std::size_t kData = @NAME@_DATA + @NAME@_POINTS * @NAME@_POINT_DATA;
 
 // Calls f once for each set of parameters: vmap gives all arrays the same leading dimensions.
@@ -22,13 +23,14 @@ ffi::Error each(const Array &X, const Array &u, const Array &data, const Array &
     const auto sizes = p.dimensions();
     for (std::size_t k = 0; k + 1 < sizes.size(); ++k)
         sets *= static_cast<std::size_t>(sizes[k]);
+    const std::size_t width = sizes.size() ? static_cast<std::size_t>(sizes[sizes.size() - 1]) : 0;
     const std::size_t n = sets ? u.element_count() / (sets * kU) : 0;
     if (X.element_count() != sets * n * kX || data.element_count() != sets * n * kData
-        || p.element_count() != sets * kP)
+        || (kArrays ? width < kP : width != kP))
         return ffi::Error::InvalidArgument("@name@: the arrays are of different numbers of elements");
     for (std::size_t s = 0; s < sets; ++s)
         f(s * n, static_cast<std::ptrdiff_t>(n), X.typed_data() + s * n * kX,
-            u.typed_data() + s * n * kU, data.typed_data() + s * n * kData, p.typed_data() + s * kP);
+            u.typed_data() + s * n * kU, data.typed_data() + s * n * kData, p.typed_data() + s * width);
     return ffi::Error::Success();
 }
 

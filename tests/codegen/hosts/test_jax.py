@@ -17,6 +17,7 @@ from softehl.codegen.language.model import Model
 from softehl.codegen.tools import host_files, model_loader
 from tests.codegen.hosts.random_pages import FEW, A, B, K, page, pages
 from tests.codegen.hosts.workshop import errors, folder, made
+from tests.crossings.pages import learned
 
 ROOT = Path(__file__).parents[3]
 PYTHON = os.environ.get("SOFTEHL_JAX", sys.executable)
@@ -29,6 +30,14 @@ def has_jax() -> bool:
 
 
 needs_jax = pytest.mark.skipif(not has_jax(), reason="no JAX; SOFTEHL_JAX names a Python with it")
+
+
+@needs_jax
+def test_a_page_with_curves_and_networks(tmp_path: Path) -> None:
+    """Its arrays stand in p; derivatives by p are refused."""
+    done = made(folder(learned.definition("quad4"), "jax", tmp_path), PYTHON=PYTHON)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "a derivative by arrays is refused" in done.stdout
 
 
 @needs_jax
