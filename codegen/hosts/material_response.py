@@ -22,7 +22,7 @@ from softehl.codegen.graph.graph import Node
 from softehl.codegen.graph.traversal import substitute
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.registry import Files, StatesOf
-from softehl.codegen.language import kinematics, model_builder
+from softehl.codegen.language import kinematics
 from softehl.codegen.language.definition import Argument, Definition, functions_of_user
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.language.model import PARENT_NAMES, Model
@@ -76,11 +76,6 @@ class Response:
             return 7 + 6 * i + j
         a, b = min(i, j), max(i, j)
         return 7 + 6 * a - a * (a - 1) // 2 + b - a
-
-
-def arrays_of(law: Law) -> tuple[str, ...]:
-    """Names of the curves and networks of a law."""
-    return tuple(a.name for a in model_builder.arrays_of(_written(law, sp.eye(3))[0]))
 
 
 def is_small_strain(law: Law) -> bool:

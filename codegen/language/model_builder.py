@@ -678,8 +678,3 @@ class ModelBuilder:
         )
         self.unroll = True
         return written
-
-
-def arrays_of(model: ModelBuilder) -> tuple[RunTimeArray, ...]:
-    """Run-time arrays that a model has declared so far."""
-    return tuple(model._arguments.arrays)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from softehl.codegen.abi import TargetError
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import registry
 from softehl.codegen.hosts.element_interface import ElementInterface
-from softehl.codegen.hosts.material_response import arrays_of
+from softehl.codegen.hosts.material_response import solid
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.material import Law
 from softehl.codegen.language.weak_form import DEFAULT_CELL, CellOptions
@@ -56,7 +57,8 @@ def generate(
 def files(d: Definition | Law, target: str) -> dict[str, str]:
     """Every file of a model for a host.  Raises `TargetError`, `NoStateError`."""
     writers = registry.host(target)
-    arrays = arrays_of(d) if isinstance(d, Law) else tuple(a.name for a in d.arrays)
+    shown = replace(solid(d), name=d.name) if isinstance(d, Law) else d
+    arrays = tuple(a.name for a in shown.arrays)
     if arrays and not writers.arrays:
         allowed = [t for t in registry.targets() if registry.host(t).arrays]
         raise TargetError(
@@ -69,6 +71,7 @@ def files(d: Definition | Law, target: str) -> dict[str, str]:
                 f"{d.name} is a material: target {target} takes elements, materials go to "
                 f"{', '.join(t for t in registry.targets() if registry.host(t).material)}"
             )
+        ElementInterface.of(shown, target)  # raises for what no host has
         return writers.material(d, _states)
     if writers.element is None:
         raise TargetError(

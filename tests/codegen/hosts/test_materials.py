@@ -169,6 +169,37 @@ def test_an_energy_that_changes_with_a_rotation_is_refused() -> None:
         host_files.files(turned, "abaqus")
 
 
+@softehl.material
+def prony(m: Material) -> None:
+    """History of each term of an array."""
+    K, dt = m.parameters(K="bulk modulus [MPa]", dt="step [s]")
+    g = m.array("g", "moduli")
+    h = m.point_array("h", g, "their history")
+    J = m.define("J", m.F.det())
+    m.energy(m.sum(g, h, lambda g, h: (g + h) * (J - 1) ** 2) + K * (J - 1) ** 2)
+    m.history(h=m.each(g, h, lambda g, h: (g + h) / (1 + dt)))
+
+
+@softehl.material
+def addressed(m: Material) -> None:
+    """A C function that is known at run time only."""
+    (K,) = m.parameters(K="bulk modulus [MPa]")
+    m.energy(m.external("law", [m.F.det(), K], derivatives=2))
+
+
+@pytest.mark.parametrize(
+    ("law", "host", "message"),
+    [
+        (prony, "c", "prony has history of each term, h: target c has no place"),
+        (prony, "ansys", "prony reads g at run time, which target ansys does not hand over"),
+        (addressed, "abaqus", "addressed gets the address of law when it is called: target abaqus"),
+    ],
+)
+def test_what_is_known_at_run_time_only_is_refused(law: Law, host: str, message: str) -> None:
+    with pytest.raises(TargetError, match=message):
+        host_files.files(law, host)
+
+
 def test_calculix_needs_an_energy() -> None:
     with pytest.raises(TargetError, match="the modulus of fluid is not symmetric at a random"):
         host_files.files(fluid, "calculix")
