@@ -1,0 +1,42 @@
+"""Brittle fracture by a phase field, AT2, split by volume and deviator.
+
+Cells: any
+Source: Amor, Marigo and Maurini (2009), JMPS 57, 1209-1229.
+Benchmark: stress of a broken point in compression.
+"""
+
+import sympy as sp
+
+from softehl import Fields, page
+
+
+@page
+def at2_amor(m: Fields) -> None:
+    """Compression of the volume keeps its stiffness."""
+    u, d = m.vector("u"), m.scalar("d")
+    E, nu, Gc, length = m.parameters(
+        E="Young's modulus [MPa]",
+        nu="Poisson's ratio",
+        Gc="toughness [N/mm]",
+        length="length of the smeared crack [mm]",
+    )
+    m.require(E > 0, nu > -1, nu < sp.Rational(1, 2), Gc > 0, length > 0)
+    (before,) = m.point_data(largest="largest energy that drives the crack so far [MPa]")
+    lame, G = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 + 2 * nu)
+    gradient = sp.zeros(3)
+    gradient[: len(u), : len(u)] = m.grad(u)[: len(u), : len(u)]
+    strain = m.define("strain", (gradient + gradient.T) / 2)
+    volume, K = strain.trace(), lame + 2 * G / 3
+    deviator = strain - volume / 3 * sp.eye(3)
+    opened, closed = sp.Max(volume, 0), sp.Min(volume, 0)
+    psi = K / 2 * opened**2 + G * (deviator * deviator).trace()
+    tension = K * opened * sp.eye(3) + 2 * G * deviator
+    compression = K * closed * sp.eye(3)
+    largest = m.define("now", sp.Max(psi, before))
+    whole = (1 - d) ** 2 + sp.Rational("1e-9")
+    stress = m.define("stress", whole * tension + compression)
+    m.weak(stress[: len(u), : len(u)], m.grad(u)[: len(u), : len(u)])
+    m.weak(Gc / length * d - 2 * (1 - d) * largest, d)
+    m.weak(Gc * length * m.grad(d), m.grad(d))
+    m.fields(sigma_xx=stress[0, 0], sigma_yy=stress[1, 1], sigma_xy=stress[0, 1])
+    m.history(largest=largest)
