@@ -9,7 +9,7 @@ derivatives are results of routines and ordinary nodes, so that they can be diff
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from fractions import Fraction
 
 from softehl.codegen.external_function import HIGHEST, ExternalFunction
@@ -446,14 +446,21 @@ def external(name: str, f: ExternalFunction, *, order: int = 0, where: str = "")
 
 
 def external_functions(roots: Iterable[Node]) -> dict[Node, ExternalFunction]:
-    """Calls of C functions below some values, also those inside local equations."""
+    """Calls of C functions below some values, also those inside other routines."""
     found: dict[Node, ExternalFunction] = {}
     waiting, seen = [list(roots)], set[Routine]()
     while waiting:
         for n in reachable(waiting.pop()):
             if isinstance(n.payload, External):
                 found[n] = n.payload.function
-            elif isinstance(n.payload, Newton) and n.payload not in seen:
+            elif isinstance(n.payload, Routine) and n.payload not in seen:
                 seen.add(n.payload)
-                waiting.append(list(n.payload.equations))
+                waiting.append(_inside(n.payload))
     return found
+
+
+def _inside(r: Routine) -> list[Node]:
+    """Values that a routine computes from its operands."""
+    values = [getattr(r, f.name) for f in fields(r)]
+    rows = [v if isinstance(v, tuple) else (v,) for v in values]
+    return [n for row in rows for n in row if isinstance(n, Node)]

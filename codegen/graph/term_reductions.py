@@ -126,8 +126,9 @@ class Reduction(Routine):
     def divided(self, between: Any, call: Node) -> list[Node]:
         """Refuse terms that hold single stretches."""
         raise DifferentiationError(
-            f"{self.name}: reductions over terms in m.principal may see symmetric functions of the "
-            "stretches only, such as invariants, not a stretch alone"
+            f"{self.name}: reductions over terms in m.principal and m.isotropic may see symmetric "
+            "functions of the stretches only, such as invariants, not a stretch alone: sum the "
+            "energies, m.sum(mu, lambda mu: m.principal(...))"
         )
 
     def slope(self, g: Graph, entry: Entry) -> Node:

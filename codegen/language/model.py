@@ -568,7 +568,7 @@ class Model(ModelBuilder):
         Parameters
         ----------
         *arrays_and_function : TermArray, then callable
-            Arrays of equal length, and a function of one entry of each, as in
+            Arrays of equal length, or lists of them, and a function of one entry of each, as in
             m.sum(g, tau, lambda g, tau: g * exp(-t / tau)). It returns a scalar, list or matrix.
 
         Returns

@@ -110,7 +110,8 @@ class Loop:
         call = f"m.{kind}(g, tau, lambda g, tau: ...)"
         if len(arguments) < 2 or not callable(arguments[-1]):
             raise ModelError(f"{kind}: give arrays, then a function of their entries: {call}")
-        *arrays, function = arguments
+        *given, function = arguments
+        arrays = [a for g in given for a in (g if isinstance(g, (list, tuple)) else [g])]
         for a in arrays:
             if not isinstance(a, TermArray):
                 raise ModelError(f"{kind}: {a!r} is no array: declare it, g = m.array('g'); {call}")
@@ -118,7 +119,11 @@ class Loop:
         entries = Entries([sp.Dummy(a.name, real=True) for a in arrays], ("",) * len(arrays), list)
         label = symbols.numbered(str(kind))
         local = symbols.placeholders(label, entries)
-        written = Entries.of(call_function(label, function, *entries.values))
+        rest = iter(entries.values)
+        shaped = [
+            [next(rest) for _ in g] if isinstance(g, (list, tuple)) else next(rest) for g in given
+        ]
+        written = Entries.of(call_function(label, function, *shaped))
         values = [symbols.lower(e) for e in written.values]
         _check(kind, values)
         system = localise(symbols.graph, values, local)

@@ -42,6 +42,7 @@ CALLS: dict[str, tuple[list[float], list[float], dict[str, Any]]] = {
     ),
     "fibres": ([], [0.3], {"parameters": {"k": [3.0, 1.0, 2.0], "crimp": [0.0, 0.1, 0.4]}}),
     "damaged_spring": ([], [0.7], {"parameters": [1.3]}),
+    "ogden_series": (SQUARE, MOVED, {"parameters": {"mu": [1.0, 0.4], "alpha": [1.7, -2.0]}}),
     "ogden": (SQUARE, MOVED, {"parameters": [1.0, 1.7]}),
     "hencky_hill": (SQUARE, MOVED, {"parameters": [1.0, 0.7, 0.4]}),
     "torsion_spring": ([], [0.2, -0.1, 0.3], {"parameters": [1.3]}),

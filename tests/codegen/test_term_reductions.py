@@ -116,6 +116,42 @@ def test_a_matrix_in_a_local_iteration() -> None:
     assert np.allclose(K[0], np.linalg.inv(slope), rtol=1e-13, atol=0)
 
 
+LAW = """
+#include <complex.h>
+int law(const double complex *x, double complex *y, double complex *dy, double complex *ddy)
+{
+    y[0] = cexp(x[0] * x[1]);
+    if (dy) dy[0] = x[1] * y[0], dy[1] = x[0] * y[0];
+    return 0;
+}
+"""
+
+
+def test_terms_hold_what_a_page_may_say() -> None:
+    """A sum of sums, local unknowns, curves, C functions, stretches and names, in 90 digits."""
+    m = Model("everything", nodes=1, rule=quadrature.point_rule())
+    u = m.unknown("u")
+    (d,) = m.parameters(d="factor")
+    g, n = m.array("g"), m.array("n")
+    C = m.define("C", sp.diag(1 + u**2, 1 + d * u / 10, 1))
+
+    def outer(g1: Any, n1: Any) -> Any:
+        inner = m.sum(g, n, lambda g2, n2: g2 * sp.exp(-u * n1 * n2))
+        s = m.implicit("s", lambda s: s + n1 * s**3 - u * d, start=0)
+        named = m.define("named", n1 * u)
+        foreign = m.external("law", [named, d], source=LAW, derivatives=1)
+        stretched = m.principal("W", C, lambda a, b, c: (a**n1 + b**n1 + c**n1) / n1)
+        return g1 * (inner + s**2 + named * m.table("k", 1 + n1 * u) + foreign + stretched)
+
+    m.potential(m.sum(g, n, outer))
+    d = m.finish()
+    library = kernel_cache.library([d])
+    tasks = list(user_kernels._entries(library.files)[d.name]["tasks"])
+    report = verification.check(d, tasks, library.folder / build.LIBRARY, seconds=3)
+    assert set(report.errors) == set(tasks)
+    assert max(report.errors.values()) < 1e-10
+
+
 def test_what_does_not_fit_is_refused() -> None:
     kernel = softehl.load_kernel(spring("sum"))
     X, u = np.empty((1, 0)), np.zeros((1, 1))
