@@ -411,7 +411,7 @@ class External(Routine):
         ]
 
     def _up_to(self, g: Graph, order: int, call: Node) -> Node:
-        """The same call with derivatives of an order."""
+        """Call of the same function with derivatives of an order."""
         if order <= self.order:
             return call
         if order > self.function.orders:

@@ -28,7 +28,7 @@ TERMS = 3
 
 
 class Kind(StrEnum):
-    """What is made of the terms."""
+    """Reductions that there are."""
 
     SUM = "sum"
     PRODUCT = "product"
@@ -150,7 +150,7 @@ class Reduction(Routine):
         return self._slopes[entry]
 
     def with_entries(self, entries: tuple[Entry, ...]) -> Reduction:
-        """The same reduction with other results."""
+        """Return the reduction with other results."""
         if entries not in self._family:
             root = next(iter(self._family.values()), self)
             self._family[entries] = Reduction(

@@ -24,7 +24,7 @@ _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*"([^"\n]+)"[^\n]*$', flags=re
 
 @dataclass(frozen=True)
 class Prototype:
-    """What a page says of a C function: its name in C, the orders and the source that it gives."""
+    """Facts of a page about a C function: its name in C, its orders and its source."""
 
     function: str
     outputs: Any
