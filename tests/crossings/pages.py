@@ -147,14 +147,9 @@ def taylor_hood(m):
 def split(m):
     """Principal strains: extensions are stiffer than shortenings (a kink between them)."""
     G, L = m.parameters(G="shear modulus [MPa]", L="first Lame parameter [MPa]")
-    C = m.define("C", m.F.T * m.F)
-
-    def density(*squares):
-        strains = [(c - 1) / 2 for c in squares]
-        bent = sum(e**2 + sp.Max(e, 0) ** 2 for e in strains)
-        return G * bent + L / 2 * sum(strains) ** 2
-
-    m.energy(m.principal("W", C, density))
+    E = (m.define("C", m.F.T * m.F) - sp.eye(3)) / 2
+    extensions = m.isotropic(E, lambda x: sp.Max(x, 0))
+    m.energy(G * ((E * E).trace() + (extensions**2).trace()) + L / 2 * E.trace() ** 2)
 
 
 @softehl.material
