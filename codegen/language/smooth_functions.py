@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import sympy as sp
@@ -72,13 +72,13 @@ class SmoothFunctions:
         factor = named("factor", factor)
         return Matrix([a * factor for a in v])
 
-    def _of_length(self, v: list[Any]) -> Any:
+    def _of_length(self, v: Sequence[Any]) -> Any:
         symbols = self._symbols
         self._count += 1
         label = f"sinc_{self._count}"
         graph = symbols.graph
         (node,) = graph.run(bessel(0, len(v)), [symbols.lower(a) for a in v])
-        name = symbols.name(label, graph.name(label, node), v, has_definition=False)
+        name = symbols.name(label, graph.name(label, node), list(v), has_definition=False)
         x = sp.sqrt(sum(a**2 for a in v)) if len(v) > 1 else v[0]
         written = sp.Piecewise((sp.sin(x) / x, sp.Ne(x, 0)), (sp.Integer(1), True))
         return symbols.record.define(name, written)

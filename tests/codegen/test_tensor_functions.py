@@ -379,7 +379,7 @@ def test_mistakes() -> None:
         m.eigenvalues([[a, b], [b, a]])
     C = sp.Matrix([[a, b], [b, a]])
     with pytest.raises(ModelError, match=r"m.isotropic: .* is no function; write `lambda x:"):
-        m.isotropic(C, sp.Max(a, 0))  # type: ignore[arg-type]
+        m.isotropic(C, sp.Max(a, 0))
     with pytest.raises(ModelError, match=r"m.isotropic: atan2 has no second divided difference"):
         m.isotropic(C, lambda x: sp.atan2(x, a))
     with pytest.raises(ModelError, match="holds a function of another tensor"):
