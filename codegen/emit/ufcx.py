@@ -181,7 +181,8 @@ def _mark(p: _CellPrinter, task: str) -> None:
 
 def source(definition: Definition, functions: Iterable[str], preamble: Iterable[str] = ()) -> str:
     """The C file of a kernel family; `preamble` are the routines that its functions call."""
-    head = [_banner(definition), "#include <math.h>", "#include <stdint.h>", ROOTS]
+    places = ["#include <stddef.h>"] if definition.arrays else []
+    head = [_banner(definition), "#include <math.h>", *places, "#include <stdint.h>", ROOTS]
     return "\n".join([*head, *preamble, *functions])
 
 
@@ -195,6 +196,11 @@ def _banner(d: Definition) -> str:
     ]
     rows += [f"A[{k} + {len(d.fields)} q]  {name}" for k, (name, _) in enumerate(d.fields)]
     rows += [f"c[{k}]  {a.name}: {a.meaning}" for k, a in enumerate(d.parameters)]
+    for k, array in enumerate(d.arrays):
+        first = len(d.parameters) + abi.ARRAY_ENTRIES * k
+        rows.append(
+            f"c[{first}], c[{first + 1}], c[{first + 2}]  place and length of {array.name}, 0"
+        )
     order = ", ".join(f"{a + 1} at {v}" for a, v in enumerate(vertices(d)))
     lines = [f"{d.name}: {d.doc}", "", f"nodes and their vertices: {order}", *rows]
     text = "\n".join(f" * {line}".rstrip() for line in lines).replace("*/", "* /")

@@ -54,9 +54,10 @@ class Kernel(Family):
 
     def __repr__(self) -> str:
         """Summary in one line."""
+        arrays = f"; arrays: {short_list([a.name for a in self.arrays])}" if self.arrays else ""
         return (
             f"<Kernel {self.name}: {self.nodes} nodes; unknowns: {short_list(self.unknowns)}; "
-            f"parameters: {short_list(self.parameters)}; data: {short_list(self.data)}>"
+            f"parameters: {short_list(self.parameters)}; data: {short_list(self.data)}{arrays}>"
         )
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.equations.interpolation import interpolation_weights
 from softehl.runtime.equations.system import System
-from softehl.runtime.mesh.mesh import MeshError, place_text
+from softehl.runtime.mesh.mesh import Mesh, MeshError, place_text
 from softehl.runtime.sensitivity.linearised_step import LinearisedStep
 from softehl.runtime.sensitivity.tape import Tape
 from softehl.runtime.suggestions import did_you_mean, join_names
@@ -41,12 +41,23 @@ class Quantity(Protocol):
         ...
 
 
+@dataclass(frozen=True, eq=False)
+class _Located:
+    """A place on a mesh with the numbers (points,) of an unknown: which of them make its value."""
+
+    mesh: Mesh
+    numbers: Integers
+    dofs: Integers
+    weights: Array
+
+
 @dataclass(frozen=True)
 class PointValue:
     """An unknown at a place of the undeformed mesh."""
 
     name: str
     point: tuple[float, ...]
+    _last: list[_Located] = field(default_factory=list, repr=False, compare=False)
 
     def value(self, tape: Tape) -> float:
         """See `Quantity`."""
@@ -57,9 +68,23 @@ class PointValue:
         return self._weights(step.tape.system)
 
     def _weights(self, system: System) -> Array:
-        """Weights (n,) of all unknowns."""
+        """Weights (n,) of all unknowns; a fit asks for them at every step of every trial."""
         _require(self.name, system)
-        point, weights_of_all = np.asarray(self.point, dtype=np.float64), np.zeros(system.size)
+        weights_of_all, numbers = np.zeros(system.size), system.numbering.nodal[self.name]
+        last = self._last[0] if self._last else None
+        if (
+            last is None
+            or last.mesh is not system.mesh
+            or not np.array_equal(last.numbers, numbers)
+        ):
+            last = _Located(system.mesh, numbers, *self._located(system))
+            self._last[:] = [last]
+        np.add.at(weights_of_all, last.dofs, last.weights)
+        return weights_of_all
+
+    def _located(self, system: System) -> tuple[Integers, Array]:
+        """Numbers and weights (k,) of the unknowns that make the value."""
+        point = np.asarray(self.point, dtype=np.float64)
         by_unknown = interpolation_weights(system, point)
         if by_unknown is None:
             raise MeshError(f"{place_text(point)} lies outside the mesh")
@@ -67,9 +92,7 @@ class PointValue:
             raise StudyError(
                 f"no {self.name} at {place_text(point)}; there are {join_names(by_unknown)}"
             )
-        dofs, weights = by_unknown[self.name]
-        np.add.at(weights_of_all, dofs, weights)
-        return weights_of_all
+        return by_unknown[self.name]
 
     def weights(self, step: LinearisedStep) -> Array:
         """See `Quantity`."""

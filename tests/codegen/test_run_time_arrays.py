@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import sympy as sp
 import softehl
 from softehl import Model, ModelError, Table, initial_weights, quadrature
 from softehl.codegen import pipeline
+from softehl.codegen.abi import Target
 from softehl.codegen.derive import task_outputs
 from softehl.codegen.graph.partial_derivatives import DifferentiationError
 from softehl.codegen.language.definition import Definition
@@ -262,6 +264,14 @@ def test_a_folder_of_c_tests_itself_with_its_arrays(tmp_path: Path) -> None:
     assert max(host_errors(done.stdout)[:4]) < 1e-12
     header = (tmp_path / "body_tri3.h").read_text(encoding="utf-8")
     assert "p[0], p[1], p[2]  place in p and length of W, and 0" in header
+
+
+def test_ufcx_compiles_with_arrays(tmp_path: Path) -> None:
+    text = pipeline.compile_model(body.definition("tri3"), Target.UFCX).text
+    assert "c[0], c[1], c[2]  place and length of W, 0" in text
+    (tmp_path / "body.c").write_text(text, encoding="utf-8")
+    strict = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"]
+    subprocess.run(["cc", *strict, str(tmp_path / "body.c")], check=True)
 
 
 def test_tables_say_what_they_are() -> None:
