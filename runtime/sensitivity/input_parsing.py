@@ -78,6 +78,8 @@ def components(
                 f"direction: {item.key!r} needs a number, or an array ({n},), given "
                 f"{type(direction[item.key]).__name__} of shape {value.shape}"
             )
+        if not np.isfinite(value).all():
+            raise StudyError(f"direction: {item.key!r} must be finite, given {value}")
         parts.append(np.broadcast_to(value.astype(np.float64), n))
     return np.concatenate(parts)
 

@@ -187,7 +187,7 @@ def quantity(
         return UserQuantity(what)
     if (at is None) == (reaction is None):
         raise StudyError(
-            f"sensitivity({what!r}): give at=(x, y), a place, or reaction=..., a side: one of them"
+            f"quantity {what!r}: give at=(x, y), a place, or reaction=..., a side: one of them"
         )
     return ReactionSum(what, reaction) if at is None and reaction is not None else _at(what, at)
 

@@ -24,6 +24,7 @@ from tests.runtime.test_derivatives import (
     panel,
     relaxing,
     rings,
+    rubber,
     solids,
     strip,
     touching,
@@ -192,6 +193,21 @@ def test_by_places_of_nodes(made: Callable[[Array], Study]) -> None:
     check(solved, {"a": 1.0, "b": 1.0, "mu": 0.4}, what="u_x", reaction="left", by=by)
 
 
+def test_through_ties_with_an_offset() -> None:
+    def solved(mu: float, offset: float) -> Result:
+        study = Study(Mesh.rectangle(2, 1, cells=(2, 2)))
+        study.add("body", rubber, mu=mu, K=0.9, swell=1.0)
+        for name, value in (("u_x", offset), ("u_y", 0.0)):
+            study.tie("right", "left", name, offset=value)
+        study.fix("bottom", u_y=0)
+        study.fix((0.0, 0.0), u_x=0)
+        study.load("top", u_x=lambda x, t: 0.05 * x[:, 0])
+        return study.solve(newton=EXACT)
+
+    by = {"body": "mu", "tie:right": "u_x"}
+    check(solved, {"mu": 0.4, "offset": 0.2}, what="u_x", at=(1.0, 1.0), by=by)
+
+
 def test_every_node_and_modes_agree() -> None:
     result = panel().solve(newton=EXACT)
     modes = np.sin(3.0 * result.system.mesh.points + 1.0)
@@ -234,6 +250,7 @@ def test_what_does_not_exist_is_refused() -> None:
         ({}, "say how inputs move"),
         ({("bar", "F"): 1.0}, r"direction: \('bar', 'F'\) is no input of by; there are"),
         ({("bar", "s"): (1.0, 2.0, 3.0)}, r"needs a number, or an array \(2,\)"),
+        ({("bar", "E"): np.nan}, r"direction: \('bar', 'E'\) must be finite"),
     ]
     for direction, words in directions:
         with pytest.raises(StudyError, match=words):
