@@ -96,6 +96,7 @@ def test_the_same_contact_is_found_on_both_meshes() -> None:
     assert pressures[1] == pytest.approx(pressures[0], rel=3e-3)
 
 
+@pytest.mark.slow
 def test_a_graded_film_needs_no_finer_mesh_at_low_speed() -> None:
     """h* of graded density 8, outstroke: 0.2581 um at 25 and 0.5953 um at 100 mm/s."""
     outcome = _curve(mesh="graded", density=2, stroke="out", speeds=(100.0, 25.0))

@@ -347,6 +347,7 @@ def test_a_path_from_rest_takes_few_steps_however_incompressible_the_rubber() ->
     assert driver.records[0].iterations < 60
 
 
+@pytest.mark.slow
 def test_an_inlet_that_is_cut_off_lacks_pressure() -> None:
     """h* lacks about a tenth of that share; the arc from -34 degrees is whole."""
     whole, cut = (
@@ -441,6 +442,7 @@ def test_viscous_friction_grows_as_speed_over_film() -> None:
     assert found == pytest.approx(0.4, abs=0.03)
 
 
+@pytest.mark.slow
 def test_viscosity_and_speed_count_by_their_product() -> None:
     """The penalty has a unit of time of its own: void fractions have none."""
     thin, thick = (

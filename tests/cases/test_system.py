@@ -339,6 +339,7 @@ def test_the_mass_conserving_film_is_that_of_the_penalty_where_nothing_forms_aga
     assert conserving[400.0].rod_friction_N < penalty[400.0].rod_friction_N
 
 
+@pytest.mark.slow
 def test_what_the_penalty_differs_by_is_its_suction() -> None:
     """At a high outstroke, without shear: it goes with one over epsilon."""
     given: dict[str, Any] = {"speeds": (1600.0,), "stroke": "out", "shear_traction": False}
