@@ -63,6 +63,10 @@ a call, and stand in `parameters` behind the constants: first three numbers for 
 `parameters`, its length, and the place of its rate or 0; then the arrays, and the rates of those
 that move. Tasks `pseudo_load` and `fields_rate` follow these rates too, of their `direction`
 nothing changes. The other tasks do not read rates.
+History of terms (`Definition.term_history`, one number for each entry of a run-time array) stands
+in `data` behind the other data of a point, variable by variable; where point data have rates, its
+own follow theirs. `fields` and `fields_rate` end with the new values, in the same order.
+
 Pointers that a family does not use (no data, no basis, no parameters, no tangent) may be NULL.
 A kernel keeps no state, allocates nothing, reports nothing: a value outside the model's domain
 comes out as not-a-number.  An element in which a local iteration (`Model.implicit`) finds no

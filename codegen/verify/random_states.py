@@ -63,6 +63,13 @@ def admissible_states(definition: Definition, count: int) -> list[State]:
 
     Raises `NoStateError`, with what to say in the model, if there are none.
     """
+    known = dict(definition.addresses)
+    unknown = [name for name in definition.functions if name not in known]
+    if unknown:
+        raise NoStateError(
+            f"{definition.name} cannot be checked: it gets the address of {unknown[0]} when it is "
+            "called; name its C text, m.external(..., source=...)"
+        )
     rng = random.Random(definition.name)
     evaluator = Evaluator(program(definition), Doubles())
     states: list[State] = []

@@ -80,7 +80,9 @@ class Family:
     whose new values the last fields are. internal: unknowns of one element alone. functions:
     parameters that are addresses of C functions; addresses: those that the page knows. cell: on
     which a page of fields stands. kept: numbers that products by sum factorisation keep at a point,
-    0 where the family has none.
+    0 where the family has none. term_groups: arrays of equal lengths. term_history: names of
+    history of terms, each with the array whose length it has; lengths: of all arrays, once they
+    are known and have given names to this history. point_rates: whether point data have rates.
     """
 
     name: str
