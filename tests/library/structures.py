@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq
 
 from softehl import Mesh, Study
+from softehl.runtime.arrays import Array, Flags
 from tests.library.benchmark import Benchmark
 
 BENCHMARKS: list[Benchmark] = []
@@ -137,3 +139,160 @@ for thickness, published in ((0.001, 0.0040624), (0.1, 0.0042728)):
             partial(plate, thickness, 16),
         )
     )
+
+
+def arc(component: str) -> float:
+    """Place of the tip of a 45-degree cantilever of radius 100, section 1 x 1, force 600."""
+    angle = np.linspace(0.0, np.pi / 4, 9)
+    points = np.stack([100 * np.sin(angle), 0 * angle, 100 * (1 - np.cos(angle))], axis=1)
+    study = Study(Mesh(points, {"line2": np.arange(8)[:, None] + [0, 1]}))
+    E, G = 1e7, 5e6
+    stiffness = {"EA": E, "GA_1": G, "GA_2": G, "EI_1": E / 12, "EI_2": E / 12}
+    study.add("beam", element="beam3d_simo", **stiffness, GJ=G / 6, a_x=0, a_y=1, a_z=0)
+    study.fix((0.0, 0.0, 0.0), u_x=0, u_y=0, u_z=0, w_x=0, w_y=0, w_z=0)
+    study.load(tuple(points[-1]), u_y=600.0)
+    tip = study.solve(steps=8).at(tuple(points[-1]))
+    return float(points[-1]["xyz".index(component)] + tip[f"u_{component}"])
+
+
+for component, published in (("z", 15.79), ("x", 47.23), ("y", 53.37)):
+    BENCHMARKS.append(
+        Benchmark(
+            "beam3d_simo",
+            f"45-degree arc of radius 100, 8 elements, force 600: tip along {component}",
+            published,
+            6e-3,
+            "Simo and Vu-Quoc (1986)",
+            partial(arc, component),
+        )
+    )
+
+
+def shell(mesh: Mesh, normal: Array, **given: float) -> Study:
+    """Study of a shell with directors (n, 3) at its nodes."""
+    first = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    study = Study(mesh)
+    data = {f"n_{c}": normal[:, k] for k, c in enumerate("xyz")}
+    data |= {f"a_{c}": first[:, k] for k, c in enumerate("xyz")}
+    load = {"q_x": 0.0, "q_y": 0.0, "q_z": 0.0}
+    study.add("shell", element="shell_mitc4", **data, **{**load, **given})
+    return study
+
+
+def surface(n: int, place: Callable[[Array], Array]) -> Mesh:
+    """n x n cells on a surface: places of points of the unit square."""
+    flat = Mesh.rectangle(1.0, 1.0, cells=(n, n))
+    return Mesh(place(flat.points), flat.cells)
+
+
+def roof(n: int = 16) -> float:
+    """Deflection of the middle of a free edge, a quarter; x along the axis, z upwards."""
+    radius, half, angle, scale = 25.0, 25.0, np.radians(40), 1e-6
+
+    def place(s: Array) -> Array:
+        a = angle * s[:, 1]
+        return np.stack([half * s[:, 0], radius * np.sin(a), radius * np.cos(a)], axis=1)
+
+    mesh = surface(n, place)
+    normal = mesh.points * [0, 1, 1] / radius
+    study = shell(mesh, normal, E=4.32e8, nu=0.0, t=0.25, q_z=-90.0 * scale)
+    middle = lambda x: np.isclose(x[:, 0], 0)  # noqa: E731
+    study.fix(middle, u_x=0)
+    study.fix(lambda x: np.isclose(x[:, 0], half), u_y=0, u_z=0)
+    study.fix(lambda x: np.isclose(x[:, 1], 0), u_y=0)
+    _symmetric(study, normal, middle, 0)
+    _symmetric(study, normal, lambda x: np.isclose(x[:, 1], 0), 1)
+    edge = place(np.array([[0.0, 1.0]]))[0]
+    return float(-study.solve().at(tuple(edge))["u_z"] / scale)
+
+
+def _symmetric(study: Study, normal: Array, where: Callable[[Array], Flags], axis: int) -> None:
+    """No rotation of the director out of a plane of symmetry, whose normal is a or n x a."""
+    nodes = np.flatnonzero(where(study.mesh.points))
+    first = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])[nodes]
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(normal[nodes], first)
+    for k in range(len(nodes)):
+        # the director moves along turn x n: theta_1 a x n + theta_2 (n x a) x n
+        moves = np.array(
+            [np.cross(first[k], normal[nodes[k]]), np.cross(second[k], normal[nodes[k]])]
+        )
+        which = int(np.abs(moves[:, axis]).argmax())
+        assert abs(moves[1 - which, axis]) < 1e-9
+        study.fix(tuple(study.mesh.points[nodes[k]]), **{f"theta_{which + 1}": 0})
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "shell_mitc4",
+        "roof of Scordelis and Lo, 16 x 16 cells a quarter: deflection of the free edge",
+        0.3024,
+        1.5e-2,
+        "MacNeal and Harder (1985)",
+        roof,
+    )
+)
+
+
+def cylinder(n: int = 32) -> float:
+    """Deflection under the load of a pinched cylinder with end diaphragms, an eighth."""
+    radius, half, scale = 300.0, 300.0, 1e-3
+
+    def place(s: Array) -> Array:
+        a = np.pi / 2 * s[:, 1]
+        return np.stack([half * s[:, 0], radius * np.sin(a), radius * np.cos(a)], axis=1)
+
+    mesh = surface(n, place)
+    normal = mesh.points * [0, 1, 1] / radius
+    study = shell(mesh, normal, E=3e6, nu=0.3, t=3.0)
+    study.fix(lambda x: np.isclose(x[:, 0], half), u_y=0, u_z=0)
+    for axis in range(3):
+        where = lambda x, axis=axis: np.isclose(x[:, axis], 0, atol=1e-9)  # noqa: E731
+        study.fix(where, **{f"u_{'xyz'[axis]}": 0})
+        _symmetric(study, normal, where, axis)
+    study.load((0.0, 0.0, radius), u_z=-0.25 * scale)
+    return float(-study.solve().at((0.0, 0.0, radius))["u_z"] / scale)
+
+
+def hemisphere(n: int = 16) -> float:
+    """Deflection under the loads of a hemisphere with a hole of 18 degrees, a quarter."""
+    radius, scale = 10.0, 1e-3
+
+    def place(s: Array) -> Array:
+        a, b = np.pi / 2 * s[:, 0], np.radians(72) * s[:, 1]
+        return radius * np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)], axis=1)
+
+    mesh = surface(n, place)
+    normal = mesh.points / radius
+    study = shell(mesh, normal, E=6.825e7, nu=0.3, t=0.04)
+    for axis in (0, 1):
+        where = lambda x, axis=axis: np.isclose(x[:, axis], 0, atol=1e-9)  # noqa: E731
+        study.fix(where, **{f"u_{'xyz'[axis]}": 0})
+        _symmetric(study, normal, where, axis)
+    study.fix((radius, 0.0, 0.0), u_z=0)
+    study.load((radius, 0.0, 0.0), u_x=scale)
+    study.load((0.0, radius, 0.0), u_y=-scale)
+    return float(study.solve().at((radius, 0.0, 0.0))["u_x"] / scale)
+
+
+BENCHMARKS += [
+    Benchmark(
+        "shell_mitc4",
+        "pinched cylinder with diaphragms, 32 x 32 cells an eighth: deflection under the load",
+        1.8248e-5,
+        3e-2,
+        "MacNeal and Harder (1985)",
+        cylinder,
+        slow=True,
+    ),
+    Benchmark(
+        "shell_mitc4",
+        "hemisphere with a hole of 18 degrees, 16 x 16 cells a quarter: deflection of a load",
+        0.0940,
+        2e-2,
+        "MacNeal and Harder (1985)",
+        hemisphere,
+        slow=True,
+    ),
+]
