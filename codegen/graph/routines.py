@@ -426,6 +426,11 @@ class External(Routine):
         f = self.function
         if order > HIGHEST:
             remedy = "third derivatives have no place in the prototype: give the first ones as y"
+        elif f.is_complex:
+            remedy = (
+                f"return {'d' * (order - 1)}y as well and say derivatives={order - 1}, the next "
+                "order follows by complex steps"
+            )
         elif f.derivatives == 0:
             remedy = (
                 "write it for numbers of type `double complex`, then derivatives follow by complex "

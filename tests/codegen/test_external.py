@@ -138,7 +138,7 @@ def test_a_wrong_derivative_is_named(right: str, wrong: str, message: str) -> No
             0,
             "law has derivatives of order 0, .* of order 1: write it for numbers of type",
         ),
-        (VALUES, None, "law has derivatives of order 1, .* of order 2"),
+        (VALUES, None, "law has derivatives of order 1, .* of order 2: return dy as well"),
     ],
 )
 def test_orders_that_are_missing(source: str, order: int | None, message: str) -> None:
