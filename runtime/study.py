@@ -185,12 +185,13 @@ class Study:
             Quadrature in place of the page's own, as in `softehl.quadrature.gauss(4, 1)`.
         constant : bool
             True if the tangent does not depend on unknowns: it is evaluated once.
-        **given : float, array or callable
+        **given : float, array, callable, Table or list
             Parameters of the page: numbers, or functions f(t) of the load factor. Data of the page:
             a number, numbers (n,) of the elements, or a function of the elements' centres (n, dim).
             `Model.nodal_data` by their declared name: one number for each node of the mesh, or a
-            function of the nodes' coordinates. Two are set by `march` and not given: `dt`, the
-            length of a step, and the parameters of `Model.rates`.
+            function of the nodes' coordinates. Curves (`Model.table`): two lists, ([20, 100], [1.2,
+            1.1]), or a `Table`. Networks: layers, as `Model.network` says. Two are set by `march`
+            and not given: `dt`, the length of a step, and the parameters of `Model.rates`.
 
         Raises
         ------
@@ -947,7 +948,8 @@ class Study:
             The inputs, as in `Result.sensitivity`.
         bounds : mapping, optional
             Input -> (lower, upper), {("rubber", "mu"): (0, 1)}. Positive parameters and data of
-            pages stay positive, unless their bounds allow other values.
+            pages stay positive, unless their bounds allow other values. Weights of a convex network
+            that must not be negative are not.
         sigma : float or array, optional
             Standard deviation of the measurements, one for all or one for each. Left out, all have
             the same weight, and the covariance follows from the residuals.

@@ -713,7 +713,9 @@ class Model(ModelBuilder):
         Parameters
         ----------
         name : str
-            Name of its weights, by which `Study.add` gets them: W=[(W1, b1), (W2, b2), (W3, b3)].
+            Name of its weights, by which `Study.add` gets them: W=[(W1, b1), (W2, b2), (W3, b3)]
+            with weights (to, from) and biases (to,) of each layer, a `state_dict` of PyTorch,
+            parameters of Flax, or all numbers in one array.
         inputs : list of Expr
             What it sees.
         layers : sequence of int

@@ -188,26 +188,26 @@ def weights_of(array: RunTimeArray, given: Any) -> Weights:
     shape = NetworkShape(
         options["inputs"], tuple(options["layers"]), options["convex"], options["monotone"]
     )
-    layers = given.layers if isinstance(given, Weights) else _layers(array.name, shape, given)
+    layers = given.layers if isinstance(given, Weights) else _layers(shape, given)
     weights = Weights(shape, layers)
     flat, least = weights.values, shape.least
     if not np.isfinite(flat).all():
-        raise ArrayDataError(f"{array.name} has weights that are not finite")
+        raise ArrayDataError("the weights are not finite")
     if (flat < least).any():
         raise ArrayDataError(
-            f"{array.name} has the weight {flat[flat < least].min():.3g}: those of hidden values "
+            f"there is the weight {flat[flat < least].min():.3g}: those of hidden values "
             "of a convex network, and all of a monotone one, must not be negative"
         )
     return weights
 
 
-def _layers(name: str, shape: NetworkShape, given: Any) -> Layers:
+def _layers(shape: NetworkShape, given: Any) -> Layers:
     """Layers of a list, a mapping of PyTorch or Flax, or one array.  Raises `ArrayDataError`."""
     if isinstance(given, Mapping):
-        given = _of_mapping(name, given)
+        given = _of_mapping(given)
     expected = [" ".join(str(s) for s in shapes) for shapes in shape.shapes]
     message = (
-        f"{name} needs for each of {len(shape.shapes)} layers weights (to, from) and biases: "
+        f"each of {len(shape.shapes)} layers has weights (to, from) and biases: "
         f"shapes {'; '.join(expected)}"
     )
     if isinstance(given, np.ndarray) and given.ndim == 1:
@@ -216,7 +216,7 @@ def _layers(name: str, shape: NetworkShape, given: Any) -> Layers:
         return shape.split(given.astype(np.float64))
     if not isinstance(given, (list, tuple)):
         raise ArrayDataError(f"{message}; given {type(given).__name__}")
-    layers = [tuple(_array(name, part) for part in layer) for layer in given]
+    layers = [tuple(_array(part) for part in layer) for layer in given]
     found = [" ".join(str(part.shape) for part in layer) for layer in layers]
     if found != expected:
         turned = [[part.T.shape for part in layer] for layer in layers]
@@ -227,22 +227,22 @@ def _layers(name: str, shape: NetworkShape, given: Any) -> Layers:
     return layers
 
 
-def _array(name: str, part: Any) -> Array:
+def _array(part: Any) -> Array:
     """Numbers of NumPy, JAX or PyTorch."""
     if hasattr(part, "detach"):
         part = part.detach().cpu().numpy()
     try:
         return np.array(part, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ArrayDataError(f"{name}: {type(part).__name__} is no array of numbers") from None
+        raise ArrayDataError(f"{type(part).__name__} is no array of numbers") from None
 
 
-def _of_mapping(name: str, given: Mapping[str, Any]) -> list[tuple[Any, ...]]:
+def _of_mapping(given: Mapping[str, Any]) -> list[tuple[Any, ...]]:
     """Layers of a state_dict of PyTorch or of parameters of Flax, in the order of their numbers."""
     while set(given) == {"params"}:
         given = given["params"]
     if given and all(isinstance(v, Mapping) for v in given.values()):
-        return [_of_flax(name, key, given[key]) for key in sorted(given, key=_number)]
+        return [_of_flax(key, given[key]) for key in sorted(given, key=_number)]
     stems: dict[str, dict[str, Any]] = {}
     for key, value in given.items():
         stem, _, kind = str(key).rpartition(".")
@@ -251,7 +251,7 @@ def _of_mapping(name: str, given: Mapping[str, Any]) -> list[tuple[Any, ...]]:
     for stem, parts in stems.items():
         if not {"weight", "bias"} <= set(parts) or set(parts) - {"weight", "bias", "skip"}:
             raise ArrayDataError(
-                f"{name}: {stem or 'the mapping'} has {', '.join(map(repr, parts))}; a state_dict "
+                f"{stem or 'the mapping'} has {', '.join(map(repr, parts))}; a state_dict "
                 "of PyTorch has 'weight' and 'bias' of every layer ('skip' for weights of inputs), "
                 "parameters of Flax 'kernel' and 'bias'"
             )
@@ -259,13 +259,13 @@ def _of_mapping(name: str, given: Mapping[str, Any]) -> list[tuple[Any, ...]]:
     return out
 
 
-def _of_flax(name: str, key: str, layer: Mapping[str, Any]) -> tuple[Any, ...]:
+def _of_flax(key: str, layer: Mapping[str, Any]) -> tuple[Any, ...]:
     """Weights of a layer of Flax, whose kernels are (from, to)."""
     if not {"kernel", "bias"} <= set(layer) or set(layer) - {"kernel", "bias", "skip"}:
         raise ArrayDataError(
-            f"{name}: layer {key} has {', '.join(map(repr, layer))}; 'kernel' and 'bias' are needed"
+            f"layer {key} has {', '.join(map(repr, layer))}; 'kernel' and 'bias' are needed"
         )
-    turned = [_array(name, layer[k]).T for k in ("kernel", "skip") if k in layer]
+    turned = [_array(layer[k]).T for k in ("kernel", "skip") if k in layer]
     return (turned[0], layer["bias"], *turned[1:])
 
 

@@ -205,7 +205,7 @@ def test_points_that_are_no_curve_are_refused(table: Kernel, given: Any, message
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ([(np.ones((2, 3)), np.ones(3))], r"layers weights \(to, from\) and biases: shapes \(3, 2"),
+        ([(np.ones((2, 3)), np.ones(3))], r"3 layers has weights \(to, from\)"),
         ([(np.ones((2, 3)), np.ones(3)), (np.ones((3, 2)), np.ones(2)), (np.ones((2, 1)), [1])],
          "transposed, as kernels of Flax"),
         ({"a.weight": 1.0}, "'weight' and 'bias' of every layer"),
