@@ -71,7 +71,7 @@ def array(
     return TermArray(name, *declare(record))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class NewTerms:
     """New history of terms as a page writes it: result `index` of a function of the entries.
 
@@ -80,6 +80,10 @@ class NewTerms:
 
     loop: Loop
     index: int
+
+    def __repr__(self) -> str:
+        """The call, as a page writes it."""
+        return "m.each(...), one value for each term, for m.history,"
 
     def _sympy_(self) -> Any:
         raise ModelError("m.each has one value for each term, no number: m.history(h=m.each(...))")
