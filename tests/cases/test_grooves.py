@@ -217,7 +217,8 @@ def test_unknown_rings_name_the_nearest(name: str, says: str) -> None:
 
 def seated(*sizes: float) -> Gland:
     names = ("inner_diameter", "section_diameter", "rod_diameter", "housing_diameter")
-    return Gland(**dict(zip((*names, "groove_width"), sizes, strict=True)))
+    given: dict[str, Any] = dict(zip((*names, "groove_width"), sizes, strict=True))
+    return Gland(**given)
 
 
 def test_stretch() -> None:
