@@ -136,8 +136,10 @@ def _compiled(definition: Definition, target: Target) -> KernelSource:
     tasks = task_outputs.tasks(definition)
     if target is Target.UFCX:
         tasks = ufcx.tasks(definition, tasks)
-    if target is Target.SIMD and form(definition).at_points:
-        return _with_action(_at_points(definition, tasks))
+    if target is Target.SIMD:
+        choice, tangent = _form(definition)
+        if choice.at_points:
+            return _with_action(_at_points(definition, tasks, tangent))
     functions = {t: compile_task(definition, t, target) for t in tasks}
     if target is Target.UFCX:
         texts = [f.text for f in functions.values()]
@@ -177,17 +179,23 @@ def _with_action(made: KernelSource) -> KernelSource:
 
 def form(d: Definition) -> Choice:
     """Form of the kernels of a model: whole elements, or loops around functions of a point."""
+    return _form(d)[0]
+
+
+def _form(d: Definition) -> tuple[Choice, Attempt | None]:
+    """The form, and the tangent at a point by which it was chosen."""
     if d.point is None:
-        return Choice(False, "no page of fields")
+        return Choice(False, "no page of fields"), None
     site = d.point.definition
     unsupported = [
         t for t, _ in d.derivatives if point_outputs.argument(site, derivative_task(t)) is None
     ]
     if unsupported:
-        return Choice(False, f"a derivative by {unsupported[0]}, which a point does not know")
+        why = f"a derivative by {unsupported[0]}, which a point does not know"
+        return Choice(False, why), None
     attempt = _moduli(site, Task.TANGENT)
     outputs = PointOutputs(attempt.entries)
-    return choose(Layout(d, d.point), outputs, attempt.operations, SHORT)
+    return choose(Layout(d, d.point), outputs, attempt.operations, SHORT), attempt
 
 
 def _moduli(site: Definition, task: str) -> Attempt:
@@ -195,11 +203,11 @@ def _moduli(site: Definition, task: str) -> Attempt:
     return _attempt(site, Variant("at a point", point_outputs.outputs(site, task)), unrolled=True)
 
 
-def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
+def _at_points(d: Definition, tasks: Sequence[str], tangent: Attempt | None) -> KernelSource:
     """All kernels of a weak form, as loops around functions of the point."""
     assert d.point is not None
     layout = Layout(d, d.point)
-    functions = {t: _at_point(layout, t) for t in tasks}
+    functions = {t: _at_point(layout, t, tangent if t == Task.TANGENT else None) for t in tasks}
     files = []
     for some in ([t for t in tasks if t not in DESIGN], [t for t in tasks if t in DESIGN]):
         texts = [functions[t].text for t in some]
@@ -214,9 +222,12 @@ def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
     return KernelSource(d, files[0], functions, files[1], shared)
 
 
-def _at_point(layout: Layout, task: str) -> Function:
-    """One kernel of a weak form: the function of a point and the loops of the cell."""
-    attempt = _moduli(layout.site, task)
+def _at_point(layout: Layout, task: str, attempt: Attempt | None) -> Function:
+    """One kernel of a weak form: the function of a point and the loops of the cell.
+
+    attempt: its outputs at a point, where they are known.
+    """
+    attempt = attempt or _moduli(layout.site, task)
     outputs, plan, called = _ordered(layout, task, attempt)
     made = point_kernel.kernel(
         layout, task, point_kernel.At(outputs, plan), _at_centroid(layout, task, outputs)

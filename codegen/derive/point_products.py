@@ -26,7 +26,7 @@ from softehl.codegen.language.definition import Definition
 
 FEW = 12
 """Unknowns below which an element is never large."""
-VAST = 40_000
+VAST = 25_000
 """Operations of a potential times unknowns from which no other way to a tangent is looked at."""
 LARGE = 8_000
 """Operations of a tangent, before any pass, up to which it is written out: its C is then compiled

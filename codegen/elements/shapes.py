@@ -148,4 +148,7 @@ def interpolate(shape: Any, nodal: Any) -> Any:
             f"interpolate: {len(shape)} shape functions and {len(nodal)} nodal values; as many "
             "are needed"
         )
-    return sum(n * v for n, v in zip(shape, nodal, strict=True))
+    terms = [n * v for n, v in zip(shape, nodal, strict=True)]
+    if all(isinstance(t, sp.Basic) for t in terms):
+        return sp.Add(*terms)  # one by one they would be sorted with each term
+    return sum(terms)

@@ -33,18 +33,19 @@ class _Backwards:
         self.peak = 0
 
     def block(self, statements: Sequence[Statement], live: frozenset[Node]) -> frozenset[Node]:
+        now = set(live)
         for s in reversed(statements):
             if isinstance(s, If):
-                live = self.branch(s, live)
+                now = set(self.branch(s, frozenset(now)))
             elif isinstance(s, Node):
-                live = self.value(s, live)
-            elif s.old in live:
-                live = (live - {s.old}) | _temporaries([s.new])
-        return live
-
-    def value(self, n: Node, live: frozenset[Node]) -> frozenset[Node]:
-        self.seen(live | {n})
-        return self.seen((live - {n}) | _temporaries(n.args))
+                self.peak = max(self.peak, len(now) + (s not in now))
+                now.discard(s)
+                now.update(a for a in s.args if a.op not in _NEVER)
+                self.peak = max(self.peak, len(now))
+            elif s.old in now:
+                now.remove(s.old)
+                now |= _temporaries([s.new])
+        return frozenset(now)
 
     def branch(self, s: If, live: frozenset[Node]) -> frozenset[Node]:
         self.seen(live | set(s.merged))

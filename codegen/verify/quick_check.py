@@ -20,7 +20,8 @@ from softehl.codegen.verify.kernel_batch import Batch
 from softehl.codegen.verify.random_states import NoStateError, admissible_states
 from softehl.codegen.verify.verification import undefined_expression
 
-STATES = 5
+STATES, POINTS = 5, 150
+"""States of a check, and points of them all together: large elements have fewer, but one."""
 LENGTHS = (1e-4, 1e-6)
 """Of a difference, in sizes of the unknowns."""
 BOUND = 1e-3
@@ -40,7 +41,7 @@ def check(d: Definition, tasks: Sequence[str], library: Path) -> None:
     Models without such a state, and those that give derivatives of their own, are left out.
     """
     try:
-        states = [] if d.prescribed else admissible_states(d, STATES)
+        states = [] if d.prescribed else admissible_states(d, _count(d))
     except NoStateError:
         return
     called = ctypes.CDLL(str(library))
@@ -62,6 +63,10 @@ def check(d: Definition, tasks: Sequence[str], library: Path) -> None:
                 f"{d.name}: its {task} contradicts differences; do not use this kernel, and report "
                 "its page as an error of softehl"
             )
+
+
+def _count(d: Definition) -> int:
+    return max(1, min(STATES, POINTS // len(d.rule.points)))
 
 
 def _direction(states: Sequence[State]) -> Vector:
