@@ -13,11 +13,14 @@ runs it in any case.
 from __future__ import annotations
 
 import json
+import multiprocessing
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from threading import Timer
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -25,6 +28,7 @@ from softehl.codegen import abi
 from softehl.codegen.tools import build, model_text
 from softehl.codegen.tools import cache_store as store
 from softehl.codegen.tools.model_text import ModelFileError
+from softehl.log import LOG
 
 if TYPE_CHECKING:
     from softehl.codegen.graph.graph import Node
@@ -226,10 +230,14 @@ def library(
     read: as in `cache.remember`. check: with the quick check of kernels that have not been through
     it (`verify.quick_check`).
     """
-    files, derived = derive(definitions)
-    folder, seconds = compiled(files)
-    if check:
-        _checked(definitions, files, folder)
+    names = ", ".join(d.name for d in definitions)
+    with BuildProgress() as progress:
+        files, derived = derive(definitions, progress)
+        progress.begin(f"compiling {names}")
+        folder, seconds = compiled(files)
+        if check:
+            progress.begin(f"checking {names}")
+            _checked(definitions, files, folder)
     if key is not None:
         store.remember(key, files, read)
     return Library(folder, files, derived, seconds)
@@ -248,7 +256,48 @@ def _checked(definitions: Sequence[Definition], files: Mapping[str, str], folder
     store.remember(passed, {"checked": ""})
 
 
-def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str, float]]:
+PATIENCE = 2.0
+"""Seconds after which a build is reported."""
+
+
+class BuildProgress:
+    """Report of what is being built, from `PATIENCE` on: in the log, and on a terminal.
+
+    A context, at whose end nothing more is reported.
+    """
+
+    def __init__(self) -> None:
+        self._start = perf_counter()
+        self._timer: Timer | None = None
+
+    def __enter__(self) -> BuildProgress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def begin(self, stage: str) -> None:
+        """Report a stage at once, or as soon as it is late enough and goes on."""
+        self.__exit__()
+        left = self._start + PATIENCE - perf_counter()
+        if left <= 0:
+            _report(stage)
+            return
+        self._timer = Timer(left, _report, [stage])
+        self._timer.daemon = True
+        self._timer.start()
+
+
+def _report(stage: str) -> None:
+    LOG.info(stage)
+    if sys.stderr.isatty() and multiprocessing.parent_process() is None:
+        print(f"softehl: {stage}", file=sys.stderr)
+
+
+def derive(
+    definitions: Sequence[Definition], progress: BuildProgress | None = None
+) -> tuple[dict[str, str], dict[str, float]]:
     """Every generated file, and seconds by kernel (empty if they were remembered)."""
     from softehl.codegen.verify.random_states import check_external_functions
 
@@ -266,6 +315,9 @@ def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str,
     kernels, seconds = [], {}
     for d in definitions:
         check_external_functions(d)
+        if progress is not None:
+            size = f"{len(d.unknowns)} unknowns, {len(d.rule.points)} points"
+            progress.begin(f"deriving {d.name}: {size}")
         start = perf_counter()
         try:
             kernels.append(pipeline.compile_model(d))

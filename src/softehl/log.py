@@ -1,6 +1,7 @@
 """The package's logger, `logging.getLogger("softehl")`: silent until a script configures it.
 
-DEBUG has Newton's iterations, INFO load and time steps, WARNING warnings of states and files.
+DEBUG has Newton's iterations, INFO load and time steps and builds of kernels that take more than
+two seconds, WARNING warnings of states and files.
 """
 
 from __future__ import annotations

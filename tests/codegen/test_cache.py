@@ -241,3 +241,23 @@ def test_what_pages_of_fields_share_is_compiled_once_and_again_where_it_is_damag
     stored.write_bytes(b"nothing")
     kernel_cache.library([page("p")])
     assert [name for name in compiled if name.endswith(".c")] == 2 * once
+
+
+# --- What is reported of a build ------------------------------------------------------------------
+
+
+def test_a_build_that_takes_long_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "cache"))
+    page = tmp_path / "spring.py"
+    page.write_text(MODEL)
+    with caplog.at_level("INFO", logger="softehl"):
+        monkeypatch.setattr(kernel_cache, "PATIENCE", 1000.0)
+        kernel_cache.folder_of(page)
+        assert caplog.messages == []
+        monkeypatch.setattr(kernel_cache, "PATIENCE", 0.0)
+        page.write_text(MODEL.replace("/ 2", "/ 3"))
+        kernel_cache.folder_of(page)
+    assert "deriving spring: 1 unknowns, 1 points" in caplog.messages
+    assert "compiling spring" in caplog.messages
