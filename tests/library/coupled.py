@@ -220,7 +220,14 @@ def kelvin() -> float:
     """Change of temperature of an insulated bar at 100 MPa."""
     E, nu, alpha, c, T_0 = 2e5, 0.3, 1.2e-5, 3.6e-3, 293.0
     study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
-    given = {"E": E, "nu": nu, "alpha": alpha, "conductivity": 0.05, "capacity": c, "T_0": T_0}
+    given: dict[str, Any] = {
+        "E": E,
+        "nu": nu,
+        "alpha": alpha,
+        "conductivity": 0.05,
+        "capacity": c,
+        "T_0": T_0,
+    }
     study.add("bar", element="thermoelastic", **given)
     study.fix("left", u_x=0)
     study.fix("front", u_y=0)

@@ -127,7 +127,7 @@ BENCHMARKS.append(
     )
 )
 
-CYCLIC = {"E": 2e5, "nu": 0.3, "sy": 200.0, "C1": 5e4, "g1": 400.0}
+CYCLIC: dict[str, Any] = {"E": 2e5, "nu": 0.3, "sy": 200.0, "C1": 5e4, "g1": 400.0}
 
 
 def saturated_cycle() -> float:
@@ -136,7 +136,7 @@ def saturated_cycle() -> float:
     cycle = np.concatenate([1 - 2 * ramp, 2 * ramp - 1])
     strains = 0.01 * np.concatenate([ramp, *[cycle] * 4])
     data = {**CYCLIC, "Q": 0.0, "b": 0.0, "C2": 0.0, "g2": 0.0}
-    return max(stress_path("chaboche", strains, **data)[-100:])
+    return max(stress_path("chaboche", strains.tolist(), **data)[-100:])
 
 
 def _saturated_cycle() -> float:
@@ -176,7 +176,7 @@ BENCHMARKS.append(
     )
 )
 
-SOIL = {"E": 1e4, "nu": 0.25, "a": 0.6, "a_flow": 0.3, "k": 2.0}
+SOIL: dict[str, Any] = {"E": 1e4, "nu": 0.25, "a": 0.6, "a_flow": 0.3, "k": 2.0}
 
 for sign, word in ((1, "tension"), (-1, "compression")):
     BENCHMARKS.append(
@@ -192,8 +192,15 @@ for sign, word in ((1, "tension"), (-1, "compression")):
         )
     )
 
-SHEET = {"E": 7e4, "nu": 0.3, "sy": 100.0, "H": 0.0}
-RATIOS = {"r_xx": 1.2, "r_yy": 0.9, "r_zz": 1.0, "r_xy": 1.1, "r_yz": 1.0, "r_xz": 1.0}
+SHEET: dict[str, Any] = {"E": 7e4, "nu": 0.3, "sy": 100.0, "H": 0.0}
+RATIOS: dict[str, Any] = {
+    "r_xx": 1.2,
+    "r_yy": 0.9,
+    "r_zz": 1.0,
+    "r_xy": 1.1,
+    "r_yz": 1.0,
+    "r_xz": 1.0,
+}
 
 
 def hill_in_shear() -> float:
@@ -223,7 +230,7 @@ BENCHMARKS += [
     ),
 ]
 
-ARTERY = {"mu": 0.01, "k1": 0.5, "k2": 5.0, "dispersion": 0.2, "angle": np.pi / 4}
+ARTERY: dict[str, Any] = {"mu": 0.01, "k1": 0.5, "k2": 5.0, "dispersion": 0.2, "angle": np.pi / 4}
 
 
 def artery() -> float:

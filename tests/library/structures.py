@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -18,7 +19,9 @@ BENCHMARKS: list[Benchmark] = []
 def truss_of_von_mises() -> float:
     """Largest force of a shallow truss, by its symmetric half, over E A."""
     a, h = 10.0, 1.0
-    study = Study(Mesh(np.array([[0.0, 0, 0], [a, h, 0]]), {"line2": np.array([[0, 1]])}))
+    study = Study(
+        Mesh(np.array([[0.0, 0, 0], [a, h, 0]]), {"line2": np.array([[0, 1]], dtype=np.int64)})
+    )
     study.add("bar", element="truss", E=1.0, A=1.0)
     study.fix((0, 0, 0), u_x=0, u_y=0, u_z=0)
     study.fix((a, h, 0), u_x=0, u_z=0)
@@ -51,7 +54,7 @@ def line(count: int, length: float, dimension: int = 3) -> Mesh:
     """A straight line along x."""
     points = np.zeros((count + 1, dimension))
     points[:, 0] = np.linspace(0.0, length, count + 1)
-    pairs = np.arange(count)[:, None] + [0, 1]
+    pairs = np.arange(count)[:, None] + np.array([0, 1])
     return Mesh(points, {"line2": pairs})
 
 
@@ -145,9 +148,9 @@ def arc(component: str) -> float:
     """Place of the tip of a 45-degree cantilever of radius 100, section 1 x 1, force 600."""
     angle = np.linspace(0.0, np.pi / 4, 9)
     points = np.stack([100 * np.sin(angle), 0 * angle, 100 * (1 - np.cos(angle))], axis=1)
-    study = Study(Mesh(points, {"line2": np.arange(8)[:, None] + [0, 1]}))
+    study = Study(Mesh(points, {"line2": np.arange(8)[:, None] + np.array([0, 1])}))
     E, G = 1e7, 5e6
-    stiffness = {"EA": E, "GA_1": G, "GA_2": G, "EI_1": E / 12, "EI_2": E / 12}
+    stiffness: dict[str, Any] = {"EA": E, "GA_1": G, "GA_2": G, "EI_1": E / 12, "EI_2": E / 12}
     study.add("beam", element="beam3d_simo", **stiffness, GJ=G / 6, a_x=0, a_y=1, a_z=0)
     study.fix((0.0, 0.0, 0.0), u_x=0, u_y=0, u_z=0, w_x=0, w_y=0, w_z=0)
     study.load(tuple(points[-1]), u_y=600.0)
@@ -168,14 +171,14 @@ for component, published in (("z", 15.79), ("x", 47.23), ("y", 53.37)):
     )
 
 
-def shell(mesh: Mesh, normal: Array, **given: float) -> Study:
+def shell(mesh: Mesh, normal: Array, **given: Any) -> Study:
     """Study of a shell with directors (n, 3) at its nodes."""
     first = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     study = Study(mesh)
-    data = {f"n_{c}": normal[:, k] for k, c in enumerate("xyz")}
+    data: dict[str, Any] = {f"n_{c}": normal[:, k] for k, c in enumerate("xyz")}
     data |= {f"a_{c}": first[:, k] for k, c in enumerate("xyz")}
-    load = {"q_x": 0.0, "q_y": 0.0, "q_z": 0.0}
+    load: dict[str, Any] = {"q_x": 0.0, "q_y": 0.0, "q_z": 0.0}
     study.add("shell", element="shell_mitc4", **data, **{**load, **given})
     return study
 

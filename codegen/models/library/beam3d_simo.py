@@ -28,7 +28,7 @@ def beam3d_simo() -> Definition:
         EI_2="bending stiffness about axis 2 [N mm2]",
     )
     m.require(*(stiffness > 0 for stiffness in (EA, GA_1, GA_2, GJ, EI_1, EI_2)))
-    a = sp.Matrix(m.data(a_x="vector near axis 1 of the section", a_y="", a_z=""))
+    a = sp.Matrix(m.data(a_x="vector near axis 1, along x", a_y="along y", a_z="along z"))
     along = sp.Matrix([x[1] - x[0] for x in X])
     length = m.define("length", m.norm(along))
     t = m.define("t", along / length)
