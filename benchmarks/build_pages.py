@@ -213,7 +213,7 @@ def exponential(m: Fields) -> None:
 
 @softehl.page
 def exponential_by_names(m: Fields) -> None:
-    """The same with a name for each term."""
+    """Exponential with a name for each term."""
     u = m.vector("u")
     mu, lame = m.parameters(mu="shear modulus", lame="first Lame parameter")
     F = m.deformation_gradient(u)
@@ -237,7 +237,7 @@ def inverse(m: Fields) -> None:
 
 @softehl.page
 def adjugate(m: Fields) -> None:
-    """The same with names, and the adjugate over the determinant."""
+    """Inverse with names, by the adjugate over the determinant."""
     u = m.vector("u")
     mu, lame = m.parameters(mu="shear modulus", lame="first Lame parameter")
     F = m.deformation_gradient(u)

@@ -18,7 +18,7 @@ class Slot(NamedTuple):
 
 
 class Array(Enum):
-    """Where an entry goes; the last three: of a tangent by products (`point_products`)."""
+    """Place of an entry; the last three: of a tangent by products (`point_products`)."""
 
     OUTPUT = ""
     SLOPES = "B"

@@ -184,7 +184,7 @@ def _cut(users: Sequence[Node], end: Node, allowed: set[Node], most: int) -> lis
 
 
 def _way(capacity: Mapping[int, Mapping[int, int]], last: int) -> dict[int, int]:
-    """Where each place that can be reached comes from, breadth first."""
+    """Predecessor of each place that can be reached, breadth first."""
     before = {-1: -1}
     waiting = deque([-1])
     while waiting and last not in before:

@@ -187,7 +187,7 @@ def _small(law: Law, m: Model) -> Response:
 
 
 def _rounding(d: Definition) -> Any:
-    """What symmetric values may differ by, relative to their size."""
+    """Difference that symmetric values may have, relative to their size."""
     return mpmath.mpf(10) ** (-12 if functions_of_user(d) else -20)
 
 

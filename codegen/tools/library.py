@@ -68,7 +68,7 @@ def entry(name: str, kind: str) -> Entry:
 
 
 def has(name: str, kind: str) -> bool:
-    """Whether the library has an entry of this name and kind."""
+    """True if the library has an entry of this name and kind."""
     try:
         return bool(entry(name, kind))
     except LibraryError:

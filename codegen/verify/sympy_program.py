@@ -257,7 +257,8 @@ class _Builder:
     def _matrix_function(self, m: MatrixFunction) -> int:
         if m not in self._slots:
             entries = self._at(*m.entries)
-            inner, content = (), ((), ())
+            inner: tuple[Step, ...] = ()
+            content: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())
             if m.function:
                 (eigenvalue, f) = self._at(*m.function)
                 inner, content = self._between((eigenvalue,), (f,)), ((eigenvalue,), (f,))

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from softehl.codegen.language.run_time_terms import TermArray
     from softehl.codegen.language.weak_form import Page, page
     from softehl.codegen.tools.cache_dir import CacheError
+    from softehl.codegen.tools.library import LibraryError
     from softehl.codegen.tools.model_text import ModelFileError
     from softehl.codegen.verify.random_states import NoStateError
     from softehl.runtime.analyses.arc_length_path import LoadPath
@@ -204,6 +205,7 @@ _MODELLING = {
     "Element": "softehl.codegen.elements.element",
     "Fields": "softehl.codegen.language.fields",
     "Law": "softehl.codegen.language.material",
+    "LibraryError": "softehl.codegen.tools.library",
     "Material": "softehl.codegen.language.material",
     "Model": "softehl.codegen.language.model",
     "ModelError": "softehl.codegen.language.errors",
@@ -258,6 +260,7 @@ __all__ = [
     "KernelError",
     "Ladder",
     "Law",
+    "LibraryError",
     "LimitPoint",
     "LoadPath",
     "Material",

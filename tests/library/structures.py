@@ -99,7 +99,7 @@ def _elastic_catenary() -> float:
     span, L, w, EA = 100.0, 110.0, 0.1, 500.0
 
     def half(H: float) -> float:
-        return H * (L / 2) / EA + H / w * np.arcsinh(w * L / 2 / H)
+        return float(H * (L / 2) / EA + H / w * np.arcsinh(w * L / 2 / H))
 
     H = float(brentq(lambda H: half(H) - span / 2, 0.1, 100.0, xtol=1e-14))
     V = w * L / 2
