@@ -50,7 +50,7 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
         "come from the scheme",
     ),
     (("tied halves",), lambda at: at.solver == "amg", "multigrid needs"),
-    (("tied halves",), lambda at: at.constraint == "tied sides", "[Ss]ingular"),  # ties in a loop
+    (("tied halves",), lambda at: at.constraint == "tied sides", "tied in a circle"),
     (("contact",), lambda at: at.analysis == "explicit", "takes no contact|explicit.*no mass"),
     (("contact",), lambda at: at.solver == "amg", "multigrid needs"),
 )
