@@ -79,6 +79,29 @@ BENCHMARKS.append(
 )
 
 
+def one_beam() -> float:
+    """Deflection of the tip of a cantilever of one element, at 30 degrees, across it."""
+    tip = (10 * np.cos(np.pi / 6), 10 * np.sin(np.pi / 6))
+    study = Study(Mesh(np.array([[0.0, 0.0], tip]), {"line2": np.array([[0, 1]])}))
+    study.add("beam", element="beam2d_timoshenko", EA=1e3, GA=50.0, EI=100.0)
+    study.fix((0.0, 0.0), u_x=0, u_y=0, theta=0)
+    study.load(tip, u_x=-np.sin(np.pi / 6), u_y=np.cos(np.pi / 6))
+    at = study.solve().at(tip)
+    return float(-np.sin(np.pi / 6) * at["u_x"] + np.cos(np.pi / 6) * at["u_y"])
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "beam2d_timoshenko",
+        "cantilever of one element, P = 1, l = 10, EI = 100, GA = 50: P l^3 / (3 EI) + P l / GA",
+        1000 / 300 + 10 / 50,
+        1e-10,
+        "closed form",
+        one_beam,
+    )
+)
+
+
 def sag(count: int = 40) -> float:
     """Sag of an elastic cable with supports at one height."""
     span, unstretched, weight, EA = 100.0, 110.0, 0.1, 500.0
