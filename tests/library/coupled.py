@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from softehl import Mesh, Study
 from tests.library.benchmark import Benchmark
@@ -251,5 +252,203 @@ BENCHMARKS.append(
         1e-8,
         "Kelvin (1853), closed form",
         kelvin,
+    )
+)
+
+CONCRETE: dict[str, Any] = {"E": 2e4, "nu": 0.2, "a": 0.9, "b": 500.0, "ratio": 10.0}
+
+
+def softening() -> float:
+    """Stress of a homogeneous bar at a strain of 1e-3, after unloading to half of it."""
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
+    study.add("bar", element="gradient_damage", **CONCRETE, length=1.0, k_0=1e-4)
+    study.fix("left", u_x=0)
+    study.fix("front", u_y=0)
+    study.fix("bottom", u_z=0)
+    study.fix("right", u_x=lambda x, t: 1e-3 * np.interp(t, [0, 1, 2], [0, 1, 0.5]))
+    *_, last = study.march(dt=0.05, until=2.0, method="euler")
+    return last.reaction("right")["u_x"]
+
+
+def smoothed() -> float:
+    """Smoothed strain by the strain, one length from an end where it is fixed at zero."""
+    study = Study(Mesh.rectangle(4.0, 0.1, cells=(40, 1), order=2))
+    study.add("bar", element="gradient_damage", **{**CONCRETE, "nu": 0.0}, length=1.0, k_0=1.0)
+    study.fix("left", u_x=0, e=0)
+    study.fix("bottom", u_y=0)
+    study.fix("right", u_x=4e-4)
+    return float(study.solve().at((1.0, 0.05))["e"] / 1e-4)
+
+
+BENCHMARKS += [
+    Benchmark(
+        "gradient_damage",
+        "homogeneous bar to 0.1 % and back to half: stress [MPa], (1 - D) E strain",
+        0.1 * (1 - 0.9 + 0.9 * float(np.exp(-500.0 * 9e-4))) * 2e4 * 5e-4,
+        1e-8,
+        "Peerlings et al. (1996), closed form",
+        softening,
+    ),
+    Benchmark(
+        "gradient_damage",
+        "elastic bar of 4 lengths, e = 0 at one end: e by the strain, one length from it",
+        1 - float(np.cosh(3.0) / np.cosh(4.0)),
+        1e-5,
+        "closed form",
+        smoothed,
+    ),
+]
+
+SWELLING: dict[str, Any] = {"E": 10.0, "nu": 0.3, "D": 1.0, "c_0": 1e-5, "RT": 2.5e6}
+MOLAR = 2e4
+RESERVOIR = 1.25e6
+
+
+def swelling(*, free: bool) -> float:
+    """Strain of a free block, or change of concentration of one that cannot grow."""
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
+    study.add("gel", element="diffusion", **SWELLING, volume=MOLAR)
+    for side, u in (("left", "u_x"), ("front", "u_y"), ("bottom", "u_z")):
+        study.fix(side, **{u: 0})
+    study.fix("boundary", mu=RESERVOIR)
+    if not free:
+        study.fix("boundary", u_x=0, u_y=0, u_z=0)
+    last = study.solve(steps=5).at((1, 1, 1))
+    return float(last["u_x"] if free else last["c"] / SWELLING["c_0"])
+
+
+def _confined() -> float:
+    """R T ln(1 + c / c_0) + volume^2 K c = mu, by c / c_0."""
+    E, nu, c_0, RT = (SWELLING[k] for k in ("E", "nu", "c_0", "RT"))
+    K = E / (3 - 6 * nu)
+    balance = lambda x: RT * np.log(1 + x) + MOLAR**2 * K * c_0 * x - RESERVOIR  # noqa: E731
+    return float(brentq(balance, 0, 1, xtol=1e-15))
+
+
+BENCHMARKS += [
+    Benchmark(
+        "diffusion",
+        "free block, mu = R T / 2: strain, volume c_0 (exp(1 / 2) - 1) / 3",
+        MOLAR * 1e-5 * float(np.exp(0.5) - 1) / 3,
+        1e-8,
+        "closed form",
+        partial(swelling, free=True),
+    ),
+    Benchmark(
+        "diffusion",
+        "confined block, mu = R T / 2: c / c_0, R T ln(1 + c / c_0) + volume^2 K c = mu",
+        _confined(),
+        1e-8,
+        "closed form",
+        partial(swelling, free=False),
+    ),
+]
+
+
+def joule() -> float:
+    """Rise of the temperature of a rubber that is stretched to three times its length."""
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
+    given: dict[str, Any] = {"mu": 0.4, "kappa": 1e5, "alpha": 0.0, "capacity": 1.8}
+    study.add("rubber", element="entropic", **given, conductivity=0.0, T_0=293.0)
+    study.fix("left", u_x=0)
+    study.fix("front", u_y=0)
+    study.fix("bottom", u_z=0)
+    study.fix("right", u_x=lambda x, t: 2.0 * t)
+    *_, last = study.march(dt=0.1, until=1.0, method="euler")
+    return float(last.at((1, 1, 1))["T"])
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "entropic",
+        "adiabatic to 3 times the length: rise [K], T_0 (exp(W / (c T_0)) - 1)",
+        293.0 * float(np.expm1(0.4 / 2 * (9 + 2 / 3 - 3) / (1.8 * 293.0))),
+        1e-4,
+        "closed form",
+        joule,
+    )
+)
+
+# PZT-5H, in N, mm, V
+CERAMIC: dict[str, Any] = {
+    **{"C11": 126e3, "C12": 79.5e3, "C13": 84.1e3, "C33": 117e3, "C44": 23e3},
+    **{"e31": -6.5e-3, "e33": 23.3e-3, "e15": 17e-3, "k11": 1.505e-8, "k33": 1.302e-8},
+}
+
+
+def actuator(direction: str) -> float:
+    """Displacement of the corner of a free block of edge 1 mm at 1000 V [nm]."""
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
+    study.add("block", element="piezo", **CERAMIC)
+    study.fix("left", u_x=0)
+    study.fix("front", u_y=0)
+    study.fix("bottom", u_z=0, phi=0)
+    study.fix("top", phi=-1000.0)
+    return float(study.solve().at((1, 1, 1))[direction] * 1e6)
+
+
+def _actuator(direction: str) -> float:
+    """Strains of zero stress: C strain = e field, C of xx, yy and zz."""
+    C11, C12, C13, C33, e31, e33 = (CERAMIC[k] for k in ("C11", "C12", "C13", "C33", "e31", "e33"))
+    C = np.array([[C11, C12, C13], [C12, C11, C13], [C13, C13, C33]])
+    strain = np.linalg.solve(C, np.array([e31, e31, e33]) * 1000.0)
+    return float(strain[["u_x", "u_y", "u_z"].index(direction)] * 1e6)
+
+
+for direction, name in (("u_z", "d33"), ("u_x", "d31")):
+    BENCHMARKS.append(
+        Benchmark(
+            "piezo",
+            f"free block of PZT-5H, 1000 V over 1 mm: {direction} [nm], 1000 {name}",
+            _actuator(direction),
+            1e-8,
+            "closed form",
+            partial(actuator, direction),
+        )
+    )
+
+
+def shear_actuator() -> float:
+    """Shear of a block that is poled along z under 1000 V along x, by 1e-6."""
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
+    study.add("block", element="piezo", **CERAMIC)
+    study.fix("bottom", u_x=0, u_y=0, u_z=0)
+    study.fix("boundary", phi=lambda x, t: -1000.0 * x[:, 0])
+    study.fix("boundary", u_y=0, u_z=0)
+    return float(study.solve().at((1, 1, 1))["u_x"] * 1e6)
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "piezo",
+        "block of PZT-5H, 1000 V across the poling over 1 mm: shear by 1e-6, 1000 e15 / C44",
+        17e-3 / 23e3 * 1e9,
+        1e-8,
+        "closed form",
+        shear_actuator,
+    )
+)
+
+
+def plates() -> float:
+    """Velocity in the middle between two plates."""
+    study = Study(Mesh.rectangle(2.0, 1.0, cells=(8, 8)))
+    study.add("fluid", element="stokes_pspg", eta=0.5)
+    study.fix("left", p=1.0, v_y=0)
+    study.fix("right", p=0.0, v_y=0)
+    for side in ("bottom", "top"):
+        study.fix(side, v_x=0, v_y=0)
+    study.load("left", v_x=1.0)
+    return float(study.solve().at((1.0, 0.5))["v_x"])
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "stokes_pspg",
+        "flow between plates, 8 x 8 cells of order 1: velocity in the middle, p' h^2 / (8 eta)",
+        0.5 / (8 * 0.5),
+        1e-8,
+        "Poiseuille, closed form",
+        plates,
     )
 )

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from softehl import Mesh, Study
@@ -264,5 +265,74 @@ BENCHMARKS.append(
         1e-5,
         "closed form",
         artery,
+    )
+)
+
+RUBBER: dict[str, Any] = {"mu": 0.5, "kappa": 5.0, "beta": [1.2, 0.7, 0.3], "tau": [0.2, 1.0, 8.0]}
+
+
+def relaxation() -> float:
+    """Shear stress of a block that is sheared to 1 in 1 s and held for 1 s."""
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1)))
+    study.add("block", material="prony", **RUBBER)
+    study.fix("boundary", u_x=lambda x, t: min(t, 1.0) * x[:, 1], u_y=0, u_z=0)
+    *_, last = study.march(dt=0.02, until=2.0, method="euler")
+    return float(last.fields("block")["sigma_xy"].mean())
+
+
+def _relaxation() -> float:
+    """Components of the second stress relax; F = 1 + g e_x e_y at the end, g = 1."""
+    mu, branches = RUBBER["mu"], list(zip(RUBBER["beta"], RUBBER["tau"], strict=True))
+
+    def shape(g: float) -> tuple[float, float]:
+        """S_xy and S_yy of mu (1 - I1 / 3 C^-1), with I1 = 3 + g^2."""
+        return mu * (1 + g**2 / 3) * g, -mu * g**2 / 3
+
+    def rate(g: float) -> float:
+        """Rate of S_xy + S_yy, g = t."""
+        return float(mu * (1 + g**2 - 2 * g / 3))
+
+    over = sum(
+        b * quad(lambda t, tau=tau: np.exp((t - 2) / tau) * rate(t), 0, 1)[0] for b, tau in branches
+    )
+    return float(sum(shape(1.0)) + over)
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "prony",
+        "simple shear to 1 in 1 s, held 1 s, 100 steps, 3 branches: shear stress [MPa]",
+        _relaxation(),
+        2e-4,
+        "hereditary integral",
+        relaxation,
+    )
+)
+
+DUCTILE: dict[str, Any] = {"E": 2e5, "nu": 0.3, "sy": 250.0, "H": 1000.0, "S": 0.5, "s": 1.5}
+
+
+def torn() -> float:
+    """Stress at a strain of 10 %."""
+    strains = np.linspace(0, 0.1, 101)[1:].tolist()
+    return stress_path("damage", strains, **DUCTILE, D_c=0.9)[-1]
+
+
+def _torn() -> float:
+    E, sy, H, S, s = (DUCTILE[k] for k in ("E", "sy", "H", "S", "s"))
+    p = (E * 0.1 - sy) / (E + H)
+    stress, power = sy + H * p, 2 * s + 1
+    D = (stress**power - sy**power) / (H * power * (2 * E * S) ** s)
+    return float((1 - D) * stress)
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "damage",
+        "tension to 10 %, H = 1000, s = 1.5, 100 steps: stress [MPa], (1 - D) (sy + H p)",
+        _torn(),
+        1e-3,
+        "Lemaitre (1985), closed form",
+        torn,
     )
 )
