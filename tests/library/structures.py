@@ -322,3 +322,153 @@ BENCHMARKS += [
         slow=True,
     ),
 ]
+
+
+def sphere(n: int = 8) -> float:
+    """Pressure p R / (2 mu t) of a sphere at 1.3 times its radius, an eighth."""
+    stretch, s = 1.3, np.tan(np.pi / 4 * np.linspace(0.0, 1.0, n + 1))
+    flat = Mesh.rectangle(1.0, 1.0, cells=(n, n))
+    a, b = np.interp(flat.points.T, np.linspace(0.0, 1.0, n + 1), s)
+    first = np.stack([1 + 0 * a, a, b], axis=1) / np.sqrt(1 + a**2 + b**2)[:, None]
+    points = np.concatenate([first, np.roll(first, 1, 1), np.roll(first, 2, 1)])
+    cells = np.concatenate([flat.cells["quad4"] + k * len(first) for k in range(3)])
+    _, kept, place = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
+    study = Study(Mesh(points[kept], {"quad4": place.reshape(-1)[cells]}))
+    p = 2 * (1 / stretch - stretch**-7)
+    study.add("skin", element="membrane", mu=1.0, t=1.0, slack=1e-6, p=p)
+    for k, c in enumerate("xyz"):
+        where = lambda x, k=k: np.isclose(x[:, k], 0)  # noqa: E731
+        study.fix(where, **{f"u_{c}": 0})
+        study.start(**{f"u_{c}": lambda x, k=k: 0.25 * x[:, k]})
+    result = study.solve(until=0.0)
+    return float(1 + result.at((1.0, 0.0, 0.0))["u_x"])
+
+
+def wrinkled_strip(slack: float = 1e-6) -> float:
+    """Moment over force and height of a strip, wrinkled up to 0.3 of its height."""
+    length, strain = 0.25, 1e-4
+    study = Study(Mesh.rectangle(length, 1.0, cells=(8, 40)).map(lift))
+    study.add("strip", element="membrane", mu=1.0, t=1.0, p=0.0, slack=slack)
+    study.fix(lambda x: x[:, 2] == 0, u_z=0)
+    study.fix(lambda x: np.isclose(x[:, 0], 0), u_x=0)
+    study.fix((0.0, 0.0, 0.0), u_y=0)
+
+    def edge(x: Array) -> Flags:
+        return np.isclose(x[:, 0], length)
+
+    study.fix(edge, u_x=lambda x, t: t * strain * length * (x[:, 1] - 0.3))
+    result = study.solve(steps=4)
+    heights = np.linspace(0.0, 1.0, 41)
+    forces = []
+    for y in heights:
+        here = lambda x, y=y: edge(x) & np.isclose(x[:, 1], y)  # noqa: E731
+        forces.append(float(result.reaction(here)["u_x"]))
+    return float(np.dot(forces, heights - 0.5) / np.sum(forces))
+
+
+def lift(x: Array) -> Array:
+    """Points of a plane in space."""
+    return np.column_stack([x, np.zeros(len(x))])
+
+
+BENCHMARKS += [
+    Benchmark(
+        "membrane",
+        "sphere under the pressure 2 mu t / R (1 / 1.3 - 1.3^-7), 3 x 8 x 8 cells an eighth: "
+        "stretch",
+        1.3,
+        5e-3,
+        "closed form",
+        sphere,
+    ),
+    Benchmark(
+        "membrane",
+        "bent strip, wrinkled up to 0.3 of its height, 8 x 40 cells: moment by force and height",
+        1 / 6 + 0.3 / 3,
+        5e-3,
+        "Stein and Hedgepeth (1961), closed form",
+        wrinkled_strip,
+    ),
+]
+
+
+def curved(n: int, length: float, radius: float, angle: float, thickness: float) -> Mesh:
+    """n x n cells of a part of a cylinder along x, one through its thickness."""
+
+    def place(s: Array) -> Array:
+        r, a = radius + (s[:, 2] - 0.5) * thickness, angle * s[:, 1]
+        return np.stack([length * s[:, 0], r * np.sin(a), r * np.cos(a)], axis=1)
+
+    return Mesh.box((1.0, 1.0, 1.0), cells=(n, n, 1)).map(place)
+
+
+def solid_roof(n: int = 16) -> float:
+    """Deflection of the middle of a free edge, a quarter, by solid shells: mean of two nodes."""
+    scale, angle, t = 1e-6, np.radians(40), 0.25
+    study = Study(curved(n, 25.0, 25.0, angle, t))
+    study.add(
+        "shell", element="solid_shell", E=4.32e8, nu=0.0, q_x=0.0, q_y=0.0, q_z=-90.0 / t * scale
+    )
+    study.fix(lambda x: np.isclose(x[:, 0], 0), u_x=0)
+    study.fix(lambda x: np.isclose(x[:, 0], 25.0), u_y=0, u_z=0)
+    study.fix(lambda x: np.isclose(x[:, 1], 0), u_y=0)
+    result = study.solve()
+    places = [(0.0, r * np.sin(angle), r * np.cos(angle)) for r in (25.0 - t / 2, 25.0 + t / 2)]
+    return float(-np.mean([result.at(x)["u_z"] for x in places]) / scale)
+
+
+def solid_cylinder(n: int = 32) -> float:
+    """Deflection under the load of a pinched cylinder, an eighth; the mean of two nodes."""
+    scale, radius, t = 1e-3, 300.0, 3.0
+    study = Study(curved(n, 300.0, radius, np.pi / 2, t))
+    study.add("shell", element="solid_shell", E=3e6, nu=0.3, q_x=0.0, q_y=0.0, q_z=0.0)
+    study.fix(lambda x: np.isclose(x[:, 0], 300.0), u_y=0, u_z=0)
+    for axis, c in enumerate("xyz"):
+        where = lambda x, axis=axis: np.isclose(x[:, axis], 0, atol=1e-9)  # noqa: E731
+        study.fix(where, **{f"u_{c}": 0})
+    places = [(0.0, 0.0, r) for r in (radius - t / 2, radius + t / 2)]
+    for x in places:
+        study.load(x, u_z=-0.125 * scale)
+    result = study.solve()
+    return float(-np.mean([result.at(x)["u_z"] for x in places]) / scale)
+
+
+def solid_strip() -> float:
+    """Deflection of a strip of one layer of solid shells by a moment, over the closed form."""
+    scale, E = 1e-6, 1000.0
+    study = Study(Mesh.box((10.0, 1.0, 0.1), cells=(5, 1, 1)))
+    study.add("strip", element="solid_shell", E=E, nu=0.3, q_x=0.0, q_y=0.0, q_z=0.0)
+    study.fix("left", u_x=0)
+    study.fix((0.0, 0.0, 0.0), u_y=0, u_z=0)
+    study.fix((0.0, 1.0, 0.0), u_z=0)
+    study.load("right", u_x=lambda x, t: t * scale * (0.05 - x[:, 2]))
+    return float(study.solve().at((10.0, 0.0, 0.0))["u_z"] / (scale * 100 / (2 * E)))
+
+
+BENCHMARKS += [
+    Benchmark(
+        "solid_shell",
+        "pure bending of a strip 10 x 1 x 0.1 of 5 cells, nu = 0.3: deflection by M l^2 / (2 E I)",
+        1.0,
+        1e-6,
+        "closed form",
+        solid_strip,
+    ),
+    Benchmark(
+        "solid_shell",
+        "roof of Scordelis and Lo, 16 x 16 x 1 cells a quarter: deflection of the free edge",
+        0.3024,
+        1.5e-2,
+        "MacNeal and Harder (1985)",
+        solid_roof,
+    ),
+    Benchmark(
+        "solid_shell",
+        "pinched cylinder with diaphragms, 32 x 32 x 1 cells an eighth: deflection under the load",
+        1.8248e-5,
+        3e-2,
+        "MacNeal and Harder (1985)",
+        solid_cylinder,
+        slow=True,
+    ),
+]
