@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from softehl import Mesh, Study
 from softehl.runtime.arrays import Array, Flags
@@ -472,3 +473,78 @@ BENCHMARKS += [
         slow=True,
     ),
 ]
+
+
+def thin_plate(clamped: bool, count: int = 16) -> float:
+    """Deflection w D / (p a^4) of a square plate of length 1, by a quarter of distorted cells."""
+
+    def distort(x: Array) -> Array:
+        s = 0.1 * np.sin(2 * np.pi * x[:, 0]) * np.sin(2 * np.pi * x[:, 1])
+        return x + np.column_stack([s, -s]) * 0.5
+
+    E, nu, t = 1.0, 0.3, 0.001
+    study = Study(Mesh.rectangle(0.5, 0.5, cells=(count, count)).map(distort))
+    study.add("plate", element="plate_dkq", E=E, nu=nu, t=t, p=1.0)
+    study.fix("left", w=0, theta_y=0)
+    study.fix("bottom", w=0, theta_x=0)
+    study.fix("right", theta_x=0)
+    study.fix("top", theta_y=0)
+    if clamped:
+        study.fix("left", theta_x=0)
+        study.fix("bottom", theta_y=0)
+    D = E * t**3 / (12 * (1 - nu**2))
+    return float(study.solve(until=1.0).at((0.5, 0.5))["w"] * D)
+
+
+for words, clamped, published, source in (
+    ("simply supported", False, 0.00406235, "series of Navier"),
+    ("clamped", True, 0.00126532, "Taylor and Govindjee (2004)"),
+):
+    BENCHMARKS.append(
+        Benchmark(
+            "plate_dkq",
+            f"{words} square plate, 16 x 16 distorted cells a quarter: w D / (p a^4)",
+            published,
+            4e-3,
+            source,
+            partial(thin_plate, clamped),
+        )
+    )
+
+
+def elastica() -> float:
+    """Deflection over length of a cantilever strip of solid shells, P l^2 / (E I) = 10."""
+    E, width, t, length = 1e6, 1.0, 0.1, 10.0
+    force = 10 * E * width * t**3 / 12 / length**2
+    study = Study(Mesh.box((length, width, t), cells=(20, 1, 1)))
+    study.add("strip", element="solid_shell", E=E, nu=0.0, q_x=0.0, q_y=0.0, q_z=0.0)
+    study.fix("left", u_x=0, u_y=0, u_z=0)
+    study.load("right", u_z=force / (width * t))
+    result = study.solve(steps=10)
+    return float(np.mean([result.at((length, 0.0, z))["u_z"] for z in (0.0, t)]) / length)
+
+
+def _elastica(load: float = 10.0) -> float:
+    """Closed form by elliptic integrals, load = P l^2 / (E I)."""
+    root = np.sqrt(load)
+
+    def start(k2: float) -> float:
+        return float(np.arcsin(np.sqrt(1 / (2 * k2))))
+
+    def excess(k2: float) -> float:
+        return float(ellipk(k2) - ellipkinc(start(k2), k2) - root)
+
+    k2 = float(brentq(excess, 0.5 + 1e-12, 1 - 1e-12, xtol=1e-15))
+    return float(1 - 2 / root * (ellipe(k2) - ellipeinc(start(k2), k2)))
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "solid_shell",
+        "cantilever strip, P l^2 / (E I) = 10, 20 cells: deflection by length",
+        _elastica(),
+        3e-3,
+        "Bisshopp and Drucker (1945), closed form",
+        elastica,
+    )
+)

@@ -2,7 +2,7 @@
 
 Cells: hex8
 Source: Klinkel, Gruttmann and Wagner (2006), CMAME 195, 179-201; Betsch and Stein (1995).
-Benchmark: roof of Scordelis and Lo, pinched cylinder, pure bending of a strip.
+Benchmark: roof of Scordelis and Lo, pinched cylinder, bending, elastica.
 """
 
 import itertools
