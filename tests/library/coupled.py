@@ -452,3 +452,51 @@ BENCHMARKS.append(
         plates,
     )
 )
+
+
+def kovasznay(n: int = 32) -> float:
+    """Velocity along x at (0.25, 0) behind a grid, Re = 40."""
+    rate = 20 - np.sqrt(400 + 4 * np.pi**2)
+    study = Study(Mesh.rectangle(1.5, 1.0, cells=(3 * n // 2, n)).map(lambda x: x - 0.5))
+    study.add("fluid", element="pspg_supg", rho=1.0, eta=1 / 40)
+    study.fix(
+        "boundary",
+        v_x=lambda x, t: t * (1 - np.exp(rate * x[:, 0]) * np.cos(2 * np.pi * x[:, 1])),
+        v_y=lambda x, t: (
+            t * rate / (2 * np.pi) * np.exp(rate * x[:, 0]) * np.sin(2 * np.pi * x[:, 1])
+        ),
+    )
+    study.fix((1.0, 0.5), p=0)
+    return float(study.solve(steps=2).at((0.25, 0.0))["v_x"])
+
+
+def lid(n: int = 32) -> float:
+    """Velocity along x at the centre of the cavity, Re = 100."""
+    study = Study(Mesh.rectangle(1.0, 1.0, cells=(n, n)))
+    study.add("fluid", element="pspg_supg", rho=100.0, eta=1.0)
+    for side in ("left", "right", "bottom"):
+        study.fix(side, v_x=0, v_y=0)
+    study.fix(lambda x: (x[:, 1] == 1.0) & (x[:, 0] > 0.0) & (x[:, 0] < 1.0), v_x=1.0, v_y=0)
+    study.fix((0.0, 0.0), p=0)
+    return float(study.solve(steps=2).at((0.5, 0.5))["v_x"])
+
+
+BENCHMARKS += [
+    Benchmark(
+        "pspg_supg",
+        "flow behind a grid, Re = 40, 48 x 32 cells of order 1: v_x at (0.25, 0)",
+        float(1 - np.exp((20 - np.sqrt(400 + 4 * np.pi**2)) / 4)),
+        1e-2,
+        "Kovasznay (1948), closed form",
+        kovasznay,
+    ),
+    Benchmark(
+        "pspg_supg",
+        "cavity with a moving lid, Re = 100, 32 x 32 cells of order 1: v_x at the centre",
+        -0.20581,
+        2e-2,
+        "Ghia, Ghia and Shin (1982)",
+        lid,
+        slow=True,
+    ),
+]
