@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from softehl import Mesh, Study, StudyError
+from softehl import Mesh, ModelFileError, Study, StudyError
 from softehl.codegen.tools.library import LONGEST, LibraryError, entries, entry
 from tests.library.benchmark import Benchmark
 from tests.library.every import BENCHMARKS
@@ -59,3 +59,20 @@ def test_names_that_are_not_there() -> None:
     study = Study(Mesh.rectangle(1, 1, cells=(1, 1)))
     with pytest.raises(StudyError, match=r"give a page, element=\.\.\. or material=\.\.\., one"):
         study.add("b", element="truss", material="hooke")
+
+
+@pytest.mark.parametrize(
+    ("element", "geometry", "message"),
+    [
+        ("plane_stress", "axisymmetric", "no hoop strain"),
+        ("micropolar", "axisymmetric", "no hoop strain"),
+        ("strain_gradient", "axisymmetric", "no hoop strain"),
+        ("pian_sumihara", "axisymmetric", "no hoop strain"),
+        ("q1e4", "axisymmetric", "no hoop strain"),
+        ("pian_tong", "plane strain", "take pian_sumihara"),
+    ],
+)
+def test_geometry_that_an_element_does_not_have(element: str, geometry: str, message: str) -> None:
+    study = Study(Mesh.rectangle(1, 1, cells=(1, 1)), geometry=geometry)
+    with pytest.raises(ModelFileError, match=message):
+        study.add("b", element=element)

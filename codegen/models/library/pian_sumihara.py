@@ -7,12 +7,14 @@ Benchmark: Cook's membrane, deflection of its corner for four meshes.
 
 import sympy as sp
 
-from softehl import Fields, page
+from softehl import Fields, ModelError, page
 
 
 @page
 def pian_sumihara(m: Fields) -> None:
     """Hellinger and Reissner: stress : strain less the complementary energy, times t."""
+    if m.geometry == "axisymmetric":
+        raise ModelError("pian_sumihara has no hoop strain: it is for bodies in the plane")
     u, b = m.vector("u"), m.internal("b", 5)
     E, nu, t = m.parameters(E="Young's modulus [MPa]", nu="Poisson's ratio", t="thickness [mm]")
     m.require(E > 0, nu > -1, nu <= sp.Rational(1, 2), t > 0)

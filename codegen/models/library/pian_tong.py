@@ -7,12 +7,14 @@ Benchmark: pure bending of one layer of cells, exact.
 
 import sympy as sp
 
-from softehl import Fields, page
+from softehl import Fields, ModelError, page
 
 
 @page
 def pian_tong(m: Fields) -> None:
     """Hellinger and Reissner: stress : strain less the complementary energy."""
+    if m.dimension < 3:
+        raise ModelError("pian_tong is for hexahedra; in the plane take pian_sumihara")
     u, b = m.vector("u"), m.internal("b", 18)
     E, nu = m.parameters(E="Young's modulus [MPa]", nu="Poisson's ratio")
     m.require(E > 0, nu > -1, nu < sp.Rational(1, 2))

@@ -7,12 +7,14 @@ Benchmark: ring under inner pressure, displacement of its inner side (Lame).
 
 import sympy as sp
 
-from softehl import Fields, page
+from softehl import Fields, ModelError, page
 
 
 @page
 def plane_stress(m: Fields) -> None:
     """Energy of an area: t E / (2 (1 - nu^2)) ((1 - nu) strain : strain + nu (tr strain)^2)."""
+    if m.geometry == "axisymmetric":
+        raise ModelError("plane_stress has no hoop strain: it is for bodies in the plane")
     u = m.vector("u")
     E, nu, t = m.parameters(E="Young's modulus [MPa]", nu="Poisson's ratio", t="thickness [mm]")
     m.require(E > 0, nu > -1, nu <= sp.Rational(1, 2), t > 0)

@@ -7,12 +7,14 @@ Benchmark: strip pulled between wide clamps, force (Treloar's pure shear).
 
 import sympy as sp
 
-from softehl import Fields, page
+from softehl import Fields, ModelError, page
 
 
 @page
 def plane_stress_neo_hooke(m: Fields) -> None:
     """mu / 2 (J^(-2/3) I1 - 3) + kappa / 4 (J^2 - 1 - 2 ln J), no stress across."""
+    if m.geometry == "axisymmetric":
+        raise ModelError("plane_stress_neo_hooke has no hoop strain: it is for bodies in the plane")
     u = m.vector("u")
     mu, kappa, t = m.parameters(
         mu="shear modulus [MPa]", kappa="bulk modulus [MPa]", t="undeformed thickness [mm]"
