@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from softehl import Mesh, Study
@@ -336,3 +337,46 @@ BENCHMARKS.append(
         torn,
     )
 )
+
+COPPER: dict[str, Any] = {"C11": 1.684e5, "C12": 1.214e5, "C44": 7.54e4, "tau_0": 60.0}
+GLIDE: dict[str, Any] = {"h": 50.0, "n": 20.0, "rate_0": 1e-3}
+AXES: dict[str, dict[str, Any]] = {
+    "[001]": {"phi_1": 0.0, "Phi": 0.4, "phi_2": 0.0},
+    "[111]": {"phi_1": float(np.arcsin(1 / np.sqrt(3))), "Phi": np.pi / 2, "phi_2": -np.pi / 4},
+}
+
+
+def glide(axis: str) -> float:
+    """Stress after 2 % at 0.001 / s along an axis of the crystal."""
+    strains = np.linspace(0, 0.02, 101)[1:].tolist()
+    return stress_path("crystal", strains, dt=0.2, **COPPER, **GLIDE, **AXES[axis])[-1]
+
+
+def _glide(axis: str) -> float:
+    """`count` systems of one Schmid factor: one slip by time, of all alike."""
+    C11, C12, C44, tau_0 = (COPPER[k] for k in ("C11", "C12", "C44", "tau_0"))
+    h, n, rate_0 = (GLIDE[k] for k in ("h", "n", "rate_0"))
+    S11, S12 = (C11 + C12) / (C11 - C12) / (C11 + 2 * C12), -C12 / (C11 - C12) / (C11 + 2 * C12)
+    along = 1 / 3 if axis == "[111]" else 0.0
+    E = 1 / (S11 - 2 * (S11 - S12 - 1 / (2 * C44)) * along)
+    count, schmid = {"[001]": (8, 1 / np.sqrt(6)), "[111]": (6, 2 / (3 * np.sqrt(6)))}[axis]
+
+    def rate(t: float, slip: Any) -> Any:
+        stress = E * (0.001 * t - count * schmid * slip)
+        return rate_0 * (schmid * stress / (tau_0 + h * count * slip)) ** n
+
+    slip = solve_ivp(rate, (0, 20), [0.0], "Radau", rtol=1e-10, atol=1e-14).y[0, -1]
+    return float(E * (0.02 - count * schmid * slip))
+
+
+for axis, count in (("[001]", 8), ("[111]", 6)):
+    BENCHMARKS.append(
+        Benchmark(
+            "crystal",
+            f"2 % along {axis} at 0.001 / s, {count} systems slip alike, 100 steps: stress [MPa]",
+            _glide(axis),
+            1e-3,
+            "Schmid's law, one equation for the slip",
+            partial(glide, axis),
+        )
+    )
