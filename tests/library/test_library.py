@@ -69,6 +69,8 @@ def test_names_that_are_not_there() -> None:
         ("strain_gradient", "axisymmetric", "no hoop strain"),
         ("pian_sumihara", "axisymmetric", "no hoop strain"),
         ("q1e4", "axisymmetric", "no hoop strain"),
+        ("at1", "axisymmetric", "no hoop strain"),
+        ("thermoelastic", "axisymmetric", "no hoop strain"),
         ("pian_tong", "plane strain", "take pian_sumihara"),
     ],
 )

@@ -7,12 +7,14 @@ Benchmark: strength of a homogeneous bar.
 
 import sympy as sp
 
-from softehl import Fields, page
+from softehl import Fields, ModelError, page
 
 
 @page
 def at2(m: Fields) -> None:
     """(1 - d)^2 psi + Gc / 2 (d^2 / length + length |grad d|^2)."""
+    if m.geometry == "axisymmetric":
+        raise ModelError("at2 has no hoop strain: it is for plane strain and space")
     u, d = m.vector("u"), m.scalar("d")
     E, nu, Gc, length = m.parameters(
         E="Young's modulus [MPa]",

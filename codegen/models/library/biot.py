@@ -7,12 +7,14 @@ Benchmark: Terzaghi's column, pore pressure at the closed end.
 
 import sympy as sp
 
-from softehl import Fields, page
+from softehl import Fields, ModelError, page
 
 
 @page
 def biot(m: Fields) -> None:
     """div(stress - p I) = 0 and div(du/dt) = div(mobility grad p)."""
+    if m.geometry == "axisymmetric":
+        raise ModelError("biot has no hoop strain: it is for plane strain and space")
     u, p = m.vector("u"), m.scalar("p", order=1)
     E, nu, k = m.parameters(
         E="Young's modulus, drained [MPa]",

@@ -7,12 +7,14 @@ Benchmark: free and confined swelling in contact with a reservoir.
 
 import sympy as sp
 
-from softehl import Fields, page
+from softehl import Fields, ModelError, page
 
 
 @page
 def diffusion(m: Fields) -> None:
     """dc/dt = div(D c / (R T) grad mu), mu = R T ln(c / c_0) - volume tr(stress) / 3."""
+    if m.geometry == "axisymmetric":
+        raise ModelError("diffusion has no hoop strain: it is for plane strain and space")
     u, c, mu = m.vector("u"), m.scalar("c"), m.scalar("mu")
     E, nu, D, c_0, volume, RT = m.parameters(
         E="Young's modulus [MPa]",

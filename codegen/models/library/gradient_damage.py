@@ -7,12 +7,14 @@ Benchmark: homogeneous softening; smoothed strain of an elastic bar beside a fix
 
 import sympy as sp
 
-from softehl import Fields, page
+from softehl import Fields, ModelError, page
 
 
 @page
 def gradient_damage(m: Fields) -> None:
     """e - length^2 div(grad e) = equivalent strain; damage by the largest e so far."""
+    if m.geometry == "axisymmetric":
+        raise ModelError("gradient_damage has no hoop strain: it is for plane strain and space")
     u, e = m.vector("u"), m.scalar("e")
     E, nu, length, k_0, a, b, ratio = m.parameters(
         E="Young's modulus [MPa]",

@@ -7,12 +7,14 @@ Benchmark: effect of Kelvin, cooling of an insulated bar in tension.
 
 import sympy as sp
 
-from softehl import Fields, page
+from softehl import Fields, ModelError, page
 
 
 @page
 def thermoelastic(m: Fields) -> None:
     """stress = C (strain - alpha T); c dT/dt + 3 K alpha T_0 tr(dstrain/dt) = div(k grad T)."""
+    if m.geometry == "axisymmetric":
+        raise ModelError("thermoelastic has no hoop strain: it is for plane strain and space")
     u, T = m.vector("u"), m.scalar("T")
     E, nu, alpha, k, c, T_0 = m.parameters(
         E="Young's modulus [MPa]",
