@@ -13,7 +13,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
-from softehl.codegen.tools.library import entries  # noqa: E402
+from softehl.codegen.tools.library import built_in, entries  # noqa: E402
 from tests.library.every import BENCHMARKS  # noqa: E402
 
 PAGE, NUMBERS = HERE / "library.md", HERE / "library.json"
@@ -49,11 +49,12 @@ def main(names: list[str]) -> None:
 def _sections(numbers: dict[str, float]) -> list[str]:
     lines = []
     for kind, title in (("element", "Elements"), ("material", "Laws")):
-        rows = [e for e in entries().values() if e.kind == kind]
+        rows = [e for e in (entries() | built_in()).values() if e.kind == kind]
         lines += [f"## {title}", "", "| name | what it is | cells | parameters | lines | source |"]
         lines += ["|---|---|---|---|---|---|"]
         for e in rows:
-            length = len(e.path.read_text(encoding="utf-8").splitlines())
+            text = e.path.read_text(encoding="utf-8")
+            length = "built in" if e.name in built_in() else len(text.splitlines())
             parameters = "; ".join(f"`{k}` {v}" for k, v in e.parameters.items())
             cells = e.cells or "any"
             lines.append(

@@ -43,6 +43,63 @@ class Entry:
     parameters: dict[str, str]
 
 
+_MU, _KAPPA = {"mu": "shear modulus [MPa]"}, {"kappa": "bulk modulus [MPa]"}
+_ELASTIC = {"E": "Young's modulus [MPa]", "nu": "Poisson's ratio, below 0.5"}
+_OGDEN = {
+    name: meaning
+    for p in (1, 2, 3)
+    for name, meaning in (
+        (f"mu_{p}", f"modulus of term {p} [MPa]"),
+        (f"alpha_{p}", f"exponent of term {p}"),
+    )
+}
+_BUILT_IN: tuple[tuple[str, str, str, dict[str, str]], ...] = (
+    ("hooke", "Linear elasticity at small strain.", "Hooke (1678)", _ELASTIC),
+    ("saint_venant", "Linear in Green's strain.", "Kirchhoff (1852)", _ELASTIC),
+    ("neo_hooke", "mu / 2 (I1bar - 3).", "Treloar (1943)", _MU | _KAPPA),
+    (
+        "mooney_rivlin",
+        "mu_1 / 2 (I1bar - 3) + mu_2 / 2 (I2bar - 3).",
+        "Mooney (1940); Rivlin (1948)",
+        dict.fromkeys(("mu_1", "mu_2"), "elastic parameter [MPa]") | _KAPPA,
+    ),
+    (
+        "yeoh",
+        "A cubic in I1bar - 3.",
+        "Yeoh (1993), Rubber Chem. Technol. 66, 754-771",
+        {f"c_{k}": f"coefficient of (I1bar - 3)^{k} [MPa]" for k in (1, 2, 3)} | _KAPPA,
+    ),
+    (
+        "gent",
+        "Chains that lock.",
+        "Gent (1996), Rubber Chem. Technol. 69, 59-61",
+        _MU | {"J_m": "limit of I1bar - 3 where the chains lock"} | _KAPPA,
+    ),
+    (
+        "arruda_boyce",
+        "Eight chains, five terms.",
+        "Arruda and Boyce (1993), JMPS 41, 389-412",
+        {"mu": "modulus of the chains [MPa]", "lambda_m": "stretch at which they lock"} | _KAPPA,
+    ),
+    (
+        "ogden",
+        "Three terms in principal stretches.",
+        "Ogden (1972), Proc. R. Soc. A 326, 565-584",
+        _OGDEN | _KAPPA,
+    ),
+)
+
+
+@cache
+def built_in() -> dict[str, Entry]:
+    """The laws of `codegen.models.material_elements` by name: no files of their own."""
+    path, benchmark = FOLDER.parent / "material_elements.py", "bar in tension, nominal stress"
+    return {
+        name: Entry(name, path, "material", summary, "", source, benchmark, (), parameters)
+        for name, summary, source, parameters in _BUILT_IN
+    }
+
+
 @cache
 def entries() -> dict[str, Entry]:
     """All entries by name; the files are read, not run."""
@@ -77,6 +134,8 @@ def has(name: str, kind: str) -> bool:
 
 def text_of(name: str) -> str:
     """The model file of an element or law, by its name.  Raises LibraryError."""
+    if name in built_in():
+        raise LibraryError(f"{name} is built in and has no file; start from that of hencky")
     kind = "material" if has(name, "material") else "element"
     return entry(name, kind).path.read_text(encoding="utf-8")
 
@@ -85,7 +144,7 @@ def print_list() -> None:
     """Print all entries, one below the other."""
     for kind, call in (("element", "element"), ("material", "material")):
         print(f"{kind}s: study.add(name, {call}=...)\n")
-        for e in (e for e in entries().values() if e.kind == kind):
+        for e in (e for e in (entries() | built_in()).values() if e.kind == kind):
             print(f"{e.name}: {e.summary}")
             rows = {
                 "cells": e.cells,

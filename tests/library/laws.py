@@ -380,3 +380,66 @@ for axis, count in (("[001]", 8), ("[111]", 6)):
             partial(glide, axis),
         )
     )
+
+RIGID: dict[str, Any] = {"kappa": 1e5}
+STRETCH = 1.5
+PULL = STRETCH - STRETCH**-2
+"""Nominal stress of an incompressible bar of I1 alone: 2 dW/dI1 PULL."""
+EXCESS = STRETCH**2 + 2 / STRETCH - 3
+"""I1 - 3."""
+
+
+def _chains(mu: float, lambda_m: float) -> float:
+    """Exact inverse b of Langevin's function: 2 dW/dI1 = mu lambda_m b / (3 stretch)."""
+    chain = np.sqrt((EXCESS + 3) / 3)
+    b = brentq(lambda b: 1 / np.tanh(b) - 1 / b - chain / lambda_m, 1e-3, 10, xtol=1e-15)
+    return float(mu * lambda_m * b / (3 * chain) * PULL)
+
+
+TERMS = ((0.63, 1.3), (0.0012, 5.0), (-0.01, -2.0))
+_OGDEN = {
+    f"{a}_{p}": v for p, t in enumerate(TERMS, 1) for a, v in zip(("mu", "alpha"), t, strict=True)
+}
+TENSION: dict[str, tuple[dict[str, Any], float, str]] = {
+    "hooke": ({"E": 2.0, "nu": 0.3}, 2.0 * 0.5, "E strain"),
+    "saint_venant": (
+        {"E": 2.0, "nu": 0.3},
+        2.0 * STRETCH * (STRETCH**2 - 1) / 2,
+        "E stretch (stretch^2 - 1) / 2",
+    ),
+    "neo_hooke": ({"mu": 0.4, **RIGID}, 0.4 * PULL, "incompressible"),
+    "mooney_rivlin": (
+        {"mu_1": 0.3, "mu_2": 0.2, **RIGID},
+        (0.3 + 0.2 / STRETCH) * PULL,
+        "incompressible",
+    ),
+    "yeoh": (
+        {"c_1": 0.2, "c_2": -0.01, "c_3": 0.002, **RIGID},
+        2 * (0.2 - 0.02 * EXCESS + 0.006 * EXCESS**2) * PULL,
+        "incompressible",
+    ),
+    "gent": ({"mu": 0.4, "J_m": 5.0, **RIGID}, 0.4 * 5 / (5 - EXCESS) * PULL, "incompressible"),
+    "arruda_boyce": (
+        {"mu": 0.4, "lambda_m": 5.0, **RIGID},
+        _chains(0.4, 5.0),
+        "incompressible, Langevin's function",
+    ),
+    "ogden": (
+        {**_OGDEN, **RIGID},
+        sum(mu * (STRETCH ** (a - 1) - STRETCH ** (-a / 2 - 1)) for mu, a in TERMS),
+        "incompressible, three terms",
+    ),
+}
+"""Laws that are built in: parameters, nominal stress, and how it is found."""
+
+for name, (data, stress, how) in TENSION.items():
+    BENCHMARKS.append(
+        Benchmark(
+            name,
+            f"{name}: tension to 1.5 times the length: nominal stress [MPa], {how}",
+            stress,
+            2e-5,
+            "closed form",
+            partial(uniaxial, name, STRETCH, **data),
+        )
+    )

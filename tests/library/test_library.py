@@ -8,9 +8,18 @@ from pathlib import Path
 import pytest
 
 from softehl import Mesh, ModelFileError, Study, StudyError
-from softehl.codegen.tools.library import LONGEST, LibraryError, entries, entry
+from softehl.codegen.models.material_elements import LAWS
+from softehl.codegen.tools.library import (
+    LONGEST,
+    LibraryError,
+    built_in,
+    entries,
+    entry,
+    text_of,
+)
 from tests.library.benchmark import Benchmark
 from tests.library.every import BENCHMARKS
+from tests.library.laws import TENSION
 
 PAGE = (Path(__file__).parents[2] / "docs" / "library.md").read_text(encoding="utf-8")
 
@@ -35,7 +44,15 @@ def test_every_entry_is_short_documented_and_has_a_number() -> None:
         assert e.benchmark, e.name
         assert e.kind == "material" or e.cells, e.name
         assert all(re.search(r"\w", meaning) for meaning in e.parameters.values()), e.name
-    assert {b.entry for b in BENCHMARKS} == set(entries())
+    assert {b.entry for b in BENCHMARKS} == set(entries()) | set(built_in())
+
+
+def test_laws_that_are_built_in() -> None:
+    assert list(built_in()) == list(LAWS)
+    for name, e in built_in().items():
+        assert set(e.parameters) == set(TENSION[name][0]), name
+    with pytest.raises(LibraryError, match="hooke is built in and has no file"):
+        text_of("hooke")
 
 
 def test_the_page_lists_every_entry_and_number() -> None:
