@@ -12,6 +12,8 @@ from softehl import Fields, page
 def piezo(m: Fields) -> None:
     """Enthalpy strain C strain / 2 - strain e E - E k E / 2 of the field E = -grad phi."""
     u, phi = m.vector("u"), m.scalar("phi")
+    if len(u) != 3:
+        raise ValueError("piezo needs a mesh in three dimensions, its poling is along z")
     C11, C12, C13, C33, C44 = m.parameters(
         C11="stiffness in the plane x-y [MPa]",
         C12="stiffness [MPa]",
