@@ -8,7 +8,6 @@ from functools import cache
 from pathlib import Path
 from types import FrameType
 
-import softehl.errors
 from softehl.errors import SoftehlError
 
 
@@ -25,11 +24,6 @@ class ModelError(SoftehlError, ValueError):
 
 
 _CODEGEN = Path(__file__).resolve().parents[1]
-_PACKAGE = (
-    _CODEGEN,
-    _CODEGEN.parent / "runtime",
-    Path(softehl.errors.__file__).resolve().parent / "__init__.py",
-)
 
 
 def page_line() -> str:
@@ -47,8 +41,7 @@ def page_line() -> str:
 def _page_file(filename: str) -> str:
     """Path of a file of code that may be a page; empty for the generator and for SymPy."""
     path = Path(filename).resolve()
-    internal = any(map(path.is_relative_to, _PACKAGE))
-    internal = internal and not path.is_relative_to(_CODEGEN / "models")
+    internal = path.is_relative_to(_CODEGEN) and not path.is_relative_to(_CODEGEN / "models")
     return "" if internal or "sympy" in path.parts or path.name.startswith("<") else str(path)
 
 

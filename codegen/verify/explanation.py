@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -88,7 +89,7 @@ class _Evaluation:
                 local = {
                     n.payload.array for n in reachable([s.value]) if isinstance(n.payload, Input)
                 } - _ARRAYS
-                where = "" if s.name.startswith(GEOMETRY) else s.where
+                where = "" if s.name.startswith(GEOMETRY) else _page_line(s.where)
                 if not local:
                     yield NamedValue(s.name, self._row(s.value), where)
                 elif local <= set(solutions):
@@ -187,10 +188,16 @@ class _Evaluation:
         """The statement of the page that holds an operation, in words."""
         for s in self.d.statements:
             if n in reachable([s.value]):
-                return f" ({s.name or 'equation'}, {s.where})"
+                return f" ({s.name or 'equation'}{_comma(_page_line(s.where))})"
         inside = set(reachable([n]))
         below = [s for s in self.d.statements if s.name and s.value in inside]
-        return f" (in a derivative, of {below[-1].name}, {below[-1].where})" if below else ""
+        if not below:
+            return ""
+        return f" (in a derivative, of {below[-1].name}{_comma(_page_line(below[-1].where))})"
+
+
+def _comma(text: str) -> str:
+    return text and f", {text}"
 
 
 def _derivatives(d: Definition) -> tuple[list[Node], list[Node]]:
@@ -205,6 +212,15 @@ def _derivatives(d: Definition) -> tuple[list[Node], list[Node]]:
     return residual, [second[u] for u in d.directions]
 
 
+def _page_line(where: str) -> str:
+    """File and line of a statement; empty where the package itself makes it."""
+    path = Path(where.rpartition(":")[0])
+    inside = any(path.is_relative_to(_PACKAGE / room) for room in ("codegen", "runtime"))
+    inside = inside or (path.parent.name, path.name) == ("softehl", "__init__.py")
+    return "" if inside and not path.is_relative_to(_PACKAGE / "codegen" / "models") else where
+
+
+_PACKAGE = Path(__file__).resolve().parents[2]
 _ARRAYS = {"coordinates", "dofs", "data", "parameters", "rule", "point data", "interpolated"} | {
     *("arrays", "term history")
 }

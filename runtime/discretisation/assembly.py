@@ -35,13 +35,15 @@ class Memo:
 
     tangents: block name -> the latest parameters of a constant tangent, the positions of its
     entries and their values. crosses: prescribed unknowns -> see `Assembler.cross`. counts: names
-    of blocks -> see `Assembler.counts`. reach: see `Assembler.reach`.
+    of blocks -> see `Assembler.counts`. reach: see `Assembler.reach`. faults: block name -> what
+    has no value there (`problem_checks.fault_message`).
     """
 
     tangents: dict[str, tuple[Array, Integers, Array]] = field(default_factory=dict)
     crosses: dict[bytes, Integers] = field(default_factory=dict)
     counts: dict[frozenset[str], Integers] = field(default_factory=dict)
     reach: Array | None = None
+    faults: dict[str, str] = field(default_factory=dict)
 
     def without(self, name: str) -> Memo:
         """A copy that knows nothing of one block's tangent."""
@@ -312,6 +314,9 @@ class Assembler:
             self.memo.reach = reach
         return self.memo.reach
 
+    def _fault(self, block: ElementBlock, x: Array, parameters: Array, row: int) -> str:
+        return fault_message(block, x, parameters, row, self.memo.faults)
+
     def not_finite(self, x: Array, parameters: Mapping[str, Array]) -> str:
         """Return the element whose residual or tangent is not finite, in words.
 
@@ -334,7 +339,7 @@ class Assembler:
                 if message:
                     row = int(rows_not_finite(results)[0])
                     message += table_ends(block, x, parameters[block.name])
-                    return message + fault_message(block, x, parameters[block.name], row)
+                    return message + self._fault(block, x, parameters[block.name], row)
         return ""
 
     def linearise(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -165,13 +166,29 @@ def not_finite(block: ElementBlock, results: Sequence[Array]) -> str:
     return element_name(block, int(invalid[0])) + more
 
 
-def fault_message(block: ElementBlock, x: Array, parameters: Array, row: int) -> str:
-    """The operation of a page without a value in an element; empty where it is not known."""
+def fault_message(
+    block: ElementBlock, x: Array, parameters: Array, row: int, known: dict[str, str]
+) -> str:
+    """The operation of a page without a value in an element; empty where it is not known.
+
+    A path cuts its steps where a residual is not finite, and asks each time: of a page whose
+    evaluation takes longer than `_PATIENCE`, `known` keeps the first answer.
+    """
+    if block.name in known:
+        return known[block.name]
+    begin = perf_counter()
     try:
         fault = block.explain(x, parameters, row).fault
     except (SoftehlError, ImportError):
         return ""  # no page, or no SymPy
-    return f": {fault}" if fault else ""
+    message = f": {fault}" if fault else ""
+    if perf_counter() - begin > _PATIENCE:
+        known[block.name] = message and f"{message}, at the first of several attempts"
+    return message
+
+
+_PATIENCE = 0.3
+"""Seconds; ten cuts of a step then take three."""
 
 
 def table_ends(block: ElementBlock, x: Array, parameters: Array) -> str:

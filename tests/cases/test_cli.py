@@ -270,7 +270,7 @@ def test_bad_input(arguments: list[str], words: str, here: Path, invoke: Invoke)
     assert [path for path in here.iterdir() if path.is_dir()] == []
 
 
-COMMANDS = "app, design, generate, kernels, keys, report, reproduce, run, sweep"
+COMMANDS = "app, design, elements, generate, kernels, keys, report, reproduce, run, sweep"
 
 
 @pytest.mark.parametrize(
