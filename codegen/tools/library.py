@@ -42,6 +42,11 @@ class Entry:
     unknowns: tuple[str, ...]
     parameters: dict[str, str]
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of cells that it is for; empty for any."""
+        return () if self.cells in ("", "any") else tuple(self.cells.split(", "))
+
 
 _MU, _KAPPA = {"mu": "shear modulus [MPa]"}, {"kappa": "bulk modulus [MPa]"}
 _ELASTIC = {"E": "Young's modulus [MPa]", "nu": "Poisson's ratio, below 0.5"}

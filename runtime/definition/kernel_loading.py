@@ -19,12 +19,16 @@ function decorated by `softehl.page`."""
 
 @dataclass(frozen=True)
 class KernelOrigin:
-    """Origin of kernels. model: one of several of a source. law: it is a stress law."""
+    """Origin of kernels. model: one of several of a source. law: it is a stress law.
+
+    cells: kinds of cells that an element of the library is for; empty for any.
+    """
 
     source: Any
     model: str | None
     geometry: str
     law: bool
+    cells: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -44,7 +48,8 @@ class KernelOrigin:
         if [source, material, element].count(None) != 2:
             raise StudyError(f"{block!r}: give a page, element=... or material=..., one of them")
         if element is not None:
-            return cls(page_loader.element_file(element), model, geometry, law=False)
+            file, cells = page_loader.element_file(element)
+            return cls(file, model, geometry, law=False, cells=cells)
         if material is None:
             return cls(source, model, geometry, law=False)
         return cls(material, model, geometry, law=True)
@@ -53,6 +58,10 @@ class KernelOrigin:
         """The kernel on a kind of cell; a kernel is there already."""
         if isinstance(self.source, Kernel):
             return self.source
+        if self.cells and kind is not None and kind not in self.cells:
+            raise StudyError(
+                f"element {Path(self.source).stem!r} is for {', '.join(self.cells)}, not for {kind}"
+            )
         require_page(self.source)
         return page_loader.load_page(
             self.source, self.model, cell=kind, geometry=self.geometry, materials=self.law

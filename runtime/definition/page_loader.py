@@ -27,10 +27,10 @@ class PageLoader(Protocol):
 
 
 class LibraryEntry(Protocol):
-    """Function that finds the file of an element of the library."""
+    """Function that finds an element of the library."""
 
-    def __call__(self, name: str) -> Path:
-        """Return the model file; raises a SoftehlError for a name that is not there."""
+    def __call__(self, name: str) -> tuple[Path, tuple[str, ...]]:
+        """Return model file and kinds of cells, empty for any; raises SoftehlError if none."""
         ...
 
 

@@ -465,10 +465,11 @@ from softehl.runtime.definition import page_loader  # noqa: E402, after __path__
 page_loader.load_page = load_kernel  # the runtime has no compiler
 
 
-def _element_file(name: str) -> Path:
+def _element_file(name: str) -> tuple[Path, tuple[str, ...]]:
     from softehl.codegen.tools.library import entry
 
-    return entry(name, "element").path
+    found = entry(name, "element")
+    return found.path, found.kinds
 
 
 page_loader.element_file = _element_file

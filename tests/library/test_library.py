@@ -17,6 +17,7 @@ from softehl.codegen.tools.library import (
     entry,
     text_of,
 )
+from softehl.runtime.mesh.cells import CELLS
 from tests.library.benchmark import Benchmark
 from tests.library.every import BENCHMARKS
 from tests.library.laws import TENSION
@@ -43,6 +44,7 @@ def test_every_entry_is_short_documented_and_has_a_number() -> None:
         assert e.source, e.name
         assert e.benchmark, e.name
         assert e.kind == "material" or e.cells, e.name
+        assert set(e.kinds) <= set(CELLS), e.name
         assert all(re.search(r"\w", meaning) for meaning in e.parameters.values()), e.name
     assert {b.entry for b in BENCHMARKS} == set(entries()) | set(built_in())
 
@@ -67,6 +69,14 @@ def test_a_wrong_number_is_seen() -> None:
     assert b.error(b.published * (1 + 2 * b.tolerance)) > b.tolerance
 
 
+def test_elements_refuse_other_cells() -> None:
+    study = Study(Mesh.rectangle(1, 1, cells=(1, 1)))
+    with pytest.raises(StudyError, match=r"'taylor_hood' is for quad9, tri6, .*, not for quad4"):
+        study.add("b", element="taylor_hood", mu=1.0)
+    with pytest.raises(StudyError, match="'truss' is for line2, not for quad4"):
+        study.add("b", element="truss", E=1.0, A=1.0)
+
+
 def test_names_that_are_not_there() -> None:
     assert entry("Hencky", "material").name == "hencky"
     with pytest.raises(LibraryError, match=r"no element 'trus'.*did you mean truss"):
@@ -79,19 +89,20 @@ def test_names_that_are_not_there() -> None:
 
 
 @pytest.mark.parametrize(
-    ("element", "geometry", "message"),
+    "element",
     [
-        ("plane_stress", "axisymmetric", "no hoop strain"),
-        ("micropolar", "axisymmetric", "no hoop strain"),
-        ("strain_gradient", "axisymmetric", "no hoop strain"),
-        ("pian_sumihara", "axisymmetric", "no hoop strain"),
-        ("q1e4", "axisymmetric", "no hoop strain"),
-        ("at1", "axisymmetric", "no hoop strain"),
-        ("thermoelastic", "axisymmetric", "no hoop strain"),
-        ("pian_tong", "plane strain", "take pian_sumihara"),
+        "plane_stress",
+        "micropolar",
+        "strain_gradient",
+        "pian_sumihara",
+        "q1e4",
+        "at1",
+        "thermoelastic",
     ],
 )
-def test_geometry_that_an_element_does_not_have(element: str, geometry: str, message: str) -> None:
-    study = Study(Mesh.rectangle(1, 1, cells=(1, 1)), geometry=geometry)
-    with pytest.raises(ModelFileError, match=message):
+def test_elements_without_a_hoop_strain_refuse_rings(element: str) -> None:
+    order = 1 if "quad4" in (entry(element, "element").kinds or ["quad4"]) else 2
+    mesh = Mesh.rectangle(1, 1, cells=(1, 1), order=order)
+    study = Study(mesh, geometry="axisymmetric")
+    with pytest.raises(ModelFileError, match="no hoop strain"):
         study.add("b", element=element)
