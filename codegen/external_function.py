@@ -124,18 +124,18 @@ class ExternalFunction:
 """
 
     def _complex_body(self) -> str:
-        m, n, given = self.inputs, self.outputs, self.derivatives
-        first = "order > 0 ? dy : NULL" if given > 0 else "NULL"
-        second = "order > 1 ? ddy : NULL" if given > 1 else "NULL"
+        m, n, derivatives = self.inputs, self.outputs, self.derivatives
+        first = "order > 0 ? dy : NULL" if derivatives > 0 else "NULL"
+        second = "order > 1 ? ddy : NULL" if derivatives > 1 else "NULL"
         by_step = ""
-        if given == 0:
+        if derivatives == 0:
             by_step = f"for (int k = 0; k < {n}; ++k) dy[k * {m} + j] = cimag(y[k]) / {STEP};"
-        elif given == 1:
+        elif derivatives == 1:
             entries = f"for (int k = 0; k < {n * m}; ++k)"
             by_step = f"{entries} ddy[k * {m} + j] = cimag(dy[k]) / {STEP};"
-        steps = f"""    for (int j = 0; order > {given} && j < {m}; ++j) {{
+        steps = f"""    for (int j = 0; order > {derivatives} && j < {m}; ++j) {{
         z[j] = x[j] + {STEP} * _Complex_I;
-        failed |= {self.name}(z, y, {"dy" if given else "NULL"}, NULL);
+        failed |= {self.name}(z, y, {"dy" if derivatives else "NULL"}, NULL);
         z[j] = x[j];
         {by_step}
     }}
@@ -147,9 +147,9 @@ class ExternalFunction:
     for (int j = 0; j < {m}; ++j) z[j] = x[j];
     int failed = {self.name}(z, y, {first}, {second});
     for (int k = 0; k < {n}; ++k) s[k] = creal(y[k]);
-    for (int k = 0; order > 0 && {given} > 0 && k < {n * m}; ++k) s[{n} + k] = creal(dy[k]);
+    for (int k = 0; order > 0 && {derivatives} > 0 && k < {n * m}; ++k) s[{n} + k] = creal(dy[k]);
 {steps if by_step else ""}\
-    for (int k = 0; order > 0 && {given} == 0 && k < {n * m}; ++k) s[{n} + k] = creal(dy[k]);
+    for (int k = 0; order > 0 && {derivatives} == 0 && k < {n * m}; ++k) s[{n} + k] = creal(dy[k]);
     for (int k = 0, at = {n * (1 + m)}; order > 1 && k < {n}; ++k)
         for (int i = 0; i < {m}; ++i)
             for (int j = i; j < {m}; ++j) s[at++] = creal(ddy[(k * {m} + i) * {m} + j]);
@@ -177,18 +177,18 @@ class ExternalFunction:
         there is no value.
         """
         bases = _bases(self, self.address)
-        place = next((b for b in bases if _is_near(b[0], x)), None)
-        if place is None:
+        base = next((b for b in bases if _is_near(b[0], x)), None)
+        if base is None:
             at = [float(v) for v in x]
-            found = self.values(at, self.orders)
-            if found is None or not all(map(math.isfinite, found[: self.outputs])):
+            results = self.values(at, self.orders)
+            if results is None or not all(map(math.isfinite, results[: self.outputs])):
                 return None
-            place = at, [v if math.isfinite(v) else 0.0 for v in found]  # `check` tells of them
-            bases.appendleft(place)
-        d = [v - number(a) for v, a in zip(x, place[0], strict=True)]
+            base = at, [v if math.isfinite(v) else 0.0 for v in results]  # `check` tells of them
+            bases.appendleft(base)
+        d = [v - number(a) for v, a in zip(x, base[0], strict=True)]
         m, n = self.inputs, self.outputs
-        found = list(map(number, place[1]))
-        y, dy, ddy = found[:n], found[n : n * (1 + m)], found[n * (1 + m) :]
+        results = list(map(number, base[1]))
+        y, dy, ddy = results[:n], results[n : n * (1 + m)], results[n * (1 + m) :]
         size = m * (m + 1) // 2
         second = (
             [ddy[k * size + upper(m, i, j)] for k in range(n) for i in range(m) for j in range(m)]
@@ -297,7 +297,7 @@ def _comparisons(
     largest = max(map(abs, x))
     for j in range(m):
         h = 1e-3 * (max(abs(x[j]), 0.1 * largest) or 1.0)
-        sides = [_beside(f, x, j, t * h) for t in (1, -1, 0.5, -0.5)]
+        sides = [_displaced_values(f, x, j, t * h) for t in (1, -1, 0.5, -0.5)]
         if any(s is None for s in sides):
             continue
         a, b, c, d = (s for s in sides if s is not None)
@@ -312,12 +312,14 @@ def _comparisons(
                 yield label, meaning, value, exact
 
 
-def _beside(f: ExternalFunction, x: Sequence[float], j: int, h: float) -> list[float] | None:
+def _displaced_values(
+    f: ExternalFunction, x: Sequence[float], j: int, h: float
+) -> list[float] | None:
     return f.values([v + h * (i == j) for i, v in enumerate(x)], max(f.orders - 1, 0))
 
 
 def _entries(f: ExternalFunction, j: int) -> Iterator[tuple[str, str, int]]:
-    """Derivatives by x[j] of each result of the order below: label, meaning, place."""
+    """Derivatives by x[j] of each result of the order below: label, meaning, index."""
     m, n = f.inputs, f.outputs
     if f.orders > 0:
         for k in range(n):
@@ -325,5 +327,5 @@ def _entries(f: ExternalFunction, j: int) -> Iterator[tuple[str, str, int]]:
     if f.orders > 1:
         for k in range(n):
             for i in range(m):
-                place = n * (1 + m) + k * m * (m + 1) // 2 + upper(m, i, j)
-                yield f"ddy[{k}][{i}][{j}]", f"the derivative of dy[{k}][{i}] by x[{j}]", place
+                index = n * (1 + m) + k * m * (m + 1) // 2 + upper(m, i, j)
+                yield f"ddy[{k}][{i}][{j}]", f"the derivative of dy[{k}][{i}] by x[{j}]", index

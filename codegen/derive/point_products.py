@@ -43,41 +43,45 @@ def outputs(d: Definition, residual: Sequence[Entry]) -> list[Entry] | None:
     split = _split(d)
     if split is None or d.prescribed or d.interpolated or any(u.varying for u in d.directions):
         return None
-    rest = split[1]
+    remainder = split[1]
     (integrand,), frozen = strip(g, [split[0]], d.constant)
     values = _values(d, integrand, set(frozen.values()))
     if values is None:
         return None
-    places = [g.input("value at a point", k, varying=True) for k in range(len(values))]
-    back = dict(zip(places, values, strict=True))
-    (inside,), images = substitute(g, [integrand], dict(zip(values, places, strict=True)))
+    point_values = [g.input("value at a point", k, varying=True) for k in range(len(values))]
+    back = dict(zip(point_values, values, strict=True))
+    (inside,), images = substitute(g, [integrand], dict(zip(values, point_values, strict=True)))
     constant = {images[c] for c in frozen.values() if c in images}
-    free = [p for p in places if p not in constant]
+    free = [p for p in point_values if p not in constant]
     first = gradient(g, inside, free, constant=constant, flat=True)
     fluxes = {p: first[p] for p in free}
-    moduli = [gradient(g, fluxes[p], places, flat=True) if p in fluxes else {} for p in places]
+    moduli = [
+        gradient(g, fluxes[p], point_values, flat=True) if p in fluxes else {} for p in point_values
+    ]
     size = range(len(values))
     pairs = [(i, j) for i in size for j in size if not (d.conservative and j > i)]
-    chosen = {
-        (i, j): moduli[i][places[j]]
+    nonzero_moduli = {
+        (i, j): moduli[i][point_values[j]]
         for i, j in pairs
-        if moduli[i].get(places[j], g.zero) is not g.zero
+        if moduli[i].get(point_values[j], g.zero) is not g.zero
     }
-    slopes = [gradient(g, z, d.directions, flat=True) for z in values]
+    b_matrix = [gradient(g, z, d.directions, flat=True) for z in values]
     curved = _curvature(d, values, {z: fluxes[p] for p, z in back.items() if p in fluxes})
-    made = [*chosen.values(), *curved.values()]
+    made = [*nonzero_moduli.values(), *curved.values()]
     new, _ = substitute(g, made, back)
     at = iter(new)
     entries = [*residual]
-    entries += [Entry(Slot(False, i), Slot(False, j), next(at), Array.MODULI) for i, j in chosen]
+    entries += [
+        Entry(Slot(False, i), Slot(False, j), next(at), Array.MODULI) for i, j in nonzero_moduli
+    ]
     entries += [Entry(Slot(False, i), Slot(False, j), next(at), Array.ADDED) for i, j in curved]
     entries += [
         Entry(Slot(False, k), Slot(False, j), row[u], Array.SLOPES)
-        for k, row in enumerate(slopes)
+        for k, row in enumerate(b_matrix)
         for j, u in enumerate(d.directions)
         if row[u] is not g.zero
     ]
-    return entries + _fixed(d, rest)
+    return entries + _fixed(d, remainder)
 
 
 def is_vast(d: Definition) -> bool:
@@ -93,7 +97,7 @@ def is_large(tangent: Sequence[Entry]) -> bool:
 def _split(d: Definition) -> tuple[Node, Node] | None:
     """Integrand of a potential that is one integral plus a value without any; None: another one."""
     g, fixed = d.graph, Dependence(tuple(d.directions))
-    integrand, rest = g.zero, g.zero
+    integrand, remainder = g.zero, g.zero
     stack = [(d.potential, g.one)]
     while stack:
         n, factor = stack.pop()
@@ -113,8 +117,8 @@ def _split(d: Definition) -> tuple[Node, Node] | None:
             case _:
                 if any(m.op is Op.SUM for m in reachable([n])) and fixed(n):
                     return None
-                rest = g.add(rest, g.mul(factor, n))
-    return None if integrand is g.zero else (integrand, rest)
+                remainder = g.add(remainder, g.mul(factor, n))
+    return None if integrand is g.zero else (integrand, remainder)
 
 
 def _values(d: Definition, integrand: Node, constant: set[Node]) -> list[Node] | None:
@@ -141,15 +145,15 @@ def _values(d: Definition, integrand: Node, constant: set[Node]) -> list[Node] |
     curved = None
     if degree[integrand] > 2:
         curved = _cut(users, integrand, allowed(2), len(d.unknowns) if not linear else len(linear))
-    chosen = curved if curved and (not linear or 2 * len(curved) <= len(linear)) else linear
-    if not chosen or any(m.op is Op.SUM for m in reachable(chosen)):
+    selected = curved if curved and (not linear or 2 * len(curved) <= len(linear)) else linear
+    if not selected or any(m.op is Op.SUM for m in reachable(selected)):
         return None
-    return sorted(chosen, key=lambda n: n.id)
+    return sorted(selected, key=lambda n: n.id)
 
 
-def _cut(users: Sequence[Node], end: Node, allowed: set[Node], most: int) -> list[Node] | None:
+def _cut(users: Sequence[Node], end: Node, allowed: set[Node], max_nodes: int) -> list[Node] | None:
     """Smallest set of allowed nodes that every way from an unknown to `end` meets, nearest to the
-    unknowns; None if it has more than `most` nodes.
+    unknowns; None if it has more than `max_nodes` nodes.
 
     Each augmenting path raises the flow through the nodes by one; a node is met at its entry (its
     number times 2) and left at its exit.
@@ -157,7 +161,7 @@ def _cut(users: Sequence[Node], end: Node, allowed: set[Node], most: int) -> lis
     number = {n: k for k, n in enumerate(users)}
     last = 2 * number[end] + 1
     capacity: dict[int, dict[int, int]] = {}
-    infinite = most + 1
+    infinite = max_nodes + 1
 
     def joined(a: int, b: int, c: int) -> None:
         capacity.setdefault(a, {})[b] = c
@@ -170,30 +174,34 @@ def _cut(users: Sequence[Node], end: Node, allowed: set[Node], most: int) -> lis
             joined(2 * a + 1, 2 * k, infinite)
         if not below:
             joined(-1, 2 * k, infinite)
-    for _ in range(most + 1):
-        before = _way(capacity, last)
-        if last not in before:
-            return [n for n, k in number.items() if 2 * k in before and 2 * k + 1 not in before]
+    for _ in range(max_nodes + 1):
+        predecessors = _predecessors(capacity, last)
+        if last not in predecessors:
+            return [
+                n
+                for n, k in number.items()
+                if 2 * k in predecessors and 2 * k + 1 not in predecessors
+            ]
         at = last
         while at != -1:
-            previous = before[at]
+            previous = predecessors[at]
             capacity[previous][at] -= 1
             capacity[at][previous] += 1
             at = previous
     return None
 
 
-def _way(capacity: Mapping[int, Mapping[int, int]], last: int) -> dict[int, int]:
-    """Predecessor of each place that can be reached, breadth first."""
-    before = {-1: -1}
+def _predecessors(capacity: Mapping[int, Mapping[int, int]], last: int) -> dict[int, int]:
+    """Predecessor of each vertex that can be reached, breadth first."""
+    predecessors = {-1: -1}
     waiting = deque([-1])
-    while waiting and last not in before:
+    while waiting and last not in predecessors:
         at = waiting.popleft()
         for to, left in capacity[at].items():
-            if left > 0 and to not in before:
-                before[to] = at
+            if left > 0 and to not in predecessors:
+                predecessors[to] = at
                 waiting.append(to)
-    return before
+    return predecessors
 
 
 def _curvature(
@@ -222,10 +230,10 @@ def _hessian(g: Graph, value: Node, unknowns: Sequence[Node]) -> dict[tuple[int,
     return {at: n for at, n in lower.items() if n is not g.zero}
 
 
-def _fixed(d: Definition, rest: Node) -> list[Entry]:
+def _fixed(d: Definition, remainder: Node) -> list[Entry]:
     """Second derivatives of what is no integral."""
     g = d.graph
-    rows = gradient(g, rest, d.directions, constant=d.constant)
+    rows = gradient(g, remainder, d.directions, constant=d.constant)
     entries = []
     for i, u in enumerate(d.directions):
         row = gradient(g, rows[u], d.directions) if rows[u] is not g.zero else {}

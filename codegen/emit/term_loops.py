@@ -60,24 +60,24 @@ def _arrays(d: Definition, r: Reduction) -> str:
     lines = []
     for k, array in enumerate(r.arrays):
         if array < 0:
-            read = f"terms->read + {_before(d, -1 - array)}"
-            place = length_place(d, d.term_history[-1 - array].array)
+            read = f"terms->read + {_history_offset(d, -1 - array)}"
+            index = length_place(d, d.term_history[-1 - array].array)
             rates = f"a{k} + {len(d.point_data) // 2} + {terms_expression(d)}"
             rates = rates if d.point_rates else "parameters"
         else:
-            place = length_place(d, array)
-            read = f"parameters + (ptrdiff_t)parameters[{place - 1}]"
-            rates = f"parameters + (ptrdiff_t)parameters[{place + 1}]"
+            index = length_place(d, array)
+            read = f"parameters + (ptrdiff_t)parameters[{index - 1}]"
+            rates = f"parameters + (ptrdiff_t)parameters[{index + 1}]"
         lines += [f"const double *const a{k} = {read};", f"const double *const r{k} = {rates};"]
         lines.append(f"(void)a{k}, (void)r{k};")
-        count = f"(ptrdiff_t)parameters[{place}]"
+        count = f"(ptrdiff_t)parameters[{index}]"
         lines.append(f"ptrdiff_t n = {count};" if k == 0 else f"if ({count} < n) n = {count};")
     if d.term_history:
         lines.append("(void)terms;")
     return "".join(f"    {line}\n" for line in lines)
 
 
-def _before(d: Definition, history: int) -> str:
+def _history_offset(d: Definition, history: int) -> str:
     """Numbers of a point before those of a history of terms."""
     lengths = [f"(ptrdiff_t)parameters[{length_place(d, h.array)}]" for h in d.term_history]
     return " + ".join(["0", *lengths[:history]])
@@ -123,33 +123,33 @@ def _start(r: Reduction, splat: str) -> str:
 def _update(d: Definition, r: Reduction, *, lanes: bool) -> Iterator[str]:
     """Statements that join a term f to what is known, t."""
     needed = r.needed()
-    place = {e: k for k, e in enumerate(needed)}
+    index_of = {e: k for k, e in enumerate(needed)}
     if r.kind is Kind.EACH:
-        for (k, _), e in place.items():
-            at = f"terms->write + {_before(d, r.targets[k])} + i"
+        for (k, _), e in index_of.items():
+            at = f"terms->write + {_history_offset(d, r.targets[k])} + i"
             store = f"softehl_store1({at}, terms->write_step, f[{e}]);"
             yield store if lanes else f"*({at}) = f[{e}];"
     elif r.kind is Kind.SUM:
-        yield from (f"t[{k}] += f[{k}];" for k in place.values())
+        yield from (f"t[{k}] += f[{k}];" for k in index_of.values())
     elif r.kind is Kind.PRODUCT:
         for entry in reversed(needed):
-            products = (f"t[{place[a]}] * f[{place[b]}]" for a, b in splits(entry))
-            yield f"t[{place[entry]}] = {' + '.join(products)};"
+            products = (f"t[{index_of[a]}] * f[{index_of[b]}]" for a, b in splits(entry))
+            yield f"t[{index_of[entry]}] = {' + '.join(products)};"
     else:
-        yield from _selection(r, place, lanes=lanes)
+        yield from _selection(r, index_of, lanes=lanes)
 
 
-def _selection(r: Reduction, place: dict[Entry, int], *, lanes: bool) -> Iterator[str]:
+def _selection(r: Reduction, index_of: dict[Entry, int], *, lanes: bool) -> Iterator[str]:
     """The better term with its derivatives; not-a-number stays."""
-    for k in dict.fromkeys(k for k, _ in place):
-        at = place[k, ()]
+    for k in dict.fromkeys(k for k, _ in index_of):
+        at = index_of[k, ()]
         pair = (f"t[{at}]", f"f[{at}]") if r.kind is Kind.MINIMUM else (f"f[{at}]", f"t[{at}]")
         if lanes:
-            kept = f"softehl_le({pair[0]}, {pair[1]})"
-            yield f"const M b{k} = ~{kept} & softehl_eq(t[{at}], t[{at}]);"
+            mask = f"softehl_le({pair[0]}, {pair[1]})"
+            yield f"const M b{k} = ~{mask} & softehl_eq(t[{at}], t[{at}]);"
         else:
             yield f"const int b{k} = !({pair[0]} <= {pair[1]}) && t[{at}] == t[{at}];"
-        for entry, e in place.items():
+        for entry, e in index_of.items():
             if entry[0] == k:
                 value = (
                     f"softehl_blend(b{k}, f[{e}], t[{e}])" if lanes else f"b{k} ? f[{e}] : t[{e}]"
@@ -158,5 +158,5 @@ def _selection(r: Reduction, place: dict[Entry, int], *, lanes: bool) -> Iterato
 
 
 def _results(r: Reduction) -> Iterator[str]:
-    place = {e: k for k, e in enumerate(r.needed())}
-    yield from (f"o[{k}] = t[{place[e]}];" for k, e in enumerate(r.entries))
+    index_of = {e: k for k, e in enumerate(r.needed())}
+    yield from (f"o[{k}] = t[{index_of[e]}];" for k, e in enumerate(r.entries))

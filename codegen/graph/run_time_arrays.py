@@ -258,16 +258,16 @@ class NetworkLayout(ArrayLayout):
 
     def value(self, array: Sequence[Number], args: Sequence[Number], f: Functions) -> Number:
         """See `ArrayLayout`."""
-        values, rest = list(args), list(array)
+        values, remaining = list(args), list(array)
         for number, (to, start, skip) in enumerate(self.shapes):
-            W, rest = rest[: to * start], rest[to * start :]
-            b, rest = rest[:to], rest[to:]
+            W, remaining = remaining[: to * start], remaining[to * start :]
+            b, remaining = remaining[:to], remaining[to:]
             new = [
                 b[i] + sum(w * h for w, h in zip(W[i * start :], values, strict=False))
                 for i in range(to)
             ]
             if skip:
-                V, rest = rest[: to * self.inputs], rest[to * self.inputs :]
+                V, remaining = remaining[: to * self.inputs], remaining[to * self.inputs :]
                 for i in range(to):
                     new[i] += sum(v * x for v, x in zip(V[i * self.inputs :], args, strict=False))
             last = number == len(self.layers)

@@ -80,7 +80,7 @@ class Reduction(Routine):
     entries: tuple[Entry, ...]
     graph: Graph = field(compare=False, repr=False)
     targets: tuple[int, ...] = ()
-    _slopes: dict[Entry, Node] = field(default_factory=dict)
+    _derivatives: dict[Entry, Node] = field(default_factory=dict)
     _family: dict[tuple[Entry, ...], Reduction] = field(default_factory=dict)
 
     def partials(self, g: Graph, item: Node) -> Partials:
@@ -136,7 +136,7 @@ class Reduction(Routine):
         k, by = entry
         if not by:
             return self.terms[k]
-        if entry not in self._slopes:
+        if entry not in self._derivatives:
             below = self.slope(g, (k, by[:-1]))
             count, i = len(self.arrays), by[-1]
             outside = self.inputs - count
@@ -146,8 +146,8 @@ class Reduction(Routine):
             else:
                 source, rate = (g.input("local", i - outside + n) for n in (0, count))
                 value = g.mul(gradient(g, below, [source])[source], rate)
-            self._slopes[entry] = value
-        return self._slopes[entry]
+            self._derivatives[entry] = value
+        return self._derivatives[entry]
 
     def with_entries(self, entries: tuple[Entry, ...]) -> Reduction:
         """Return the reduction with other results."""
@@ -163,7 +163,7 @@ class Reduction(Routine):
                 entries,
                 self.graph,
                 self.targets,
-                self._slopes,
+                self._derivatives,
                 self._family,
             )
         return self._family[entries]
@@ -175,17 +175,17 @@ class Reduction(Routine):
 
     def needed(self) -> list[Entry]:
         """Derivatives of term functions that the loop needs, lower ones first."""
-        wanted = dict.fromkeys(self.entries)
+        required = dict.fromkeys(self.entries)
         if self.kind is Kind.PRODUCT:
-            wanted = dict.fromkeys(
+            required = dict.fromkeys(
                 (k, part)
                 for k, by in self.entries
                 for n in range(len(by) + 1)
                 for part in combinations(by, n)
             )
         elif self.kind not in (Kind.SUM, Kind.EACH):
-            wanted = dict.fromkeys([*((k, ()) for k, _ in self.entries), *self.entries])
-        return sorted(wanted, key=lambda e: (len(e[1]), e))
+            required = dict.fromkeys([*((k, ()) for k, _ in self.entries), *self.entries])
+        return sorted(required, key=lambda e: (len(e[1]), e))
 
     def results(
         self,
@@ -229,11 +229,11 @@ class Reduction(Routine):
 def splits(entry: Entry) -> Iterator[tuple[Entry, Entry]]:
     """Pairs of derivatives in Leibniz' rule for a product of two."""
     k, by = entry
-    places = range(len(by))
+    indices = range(len(by))
     for n in range(len(by) + 1):
-        for chosen in combinations(places, n):
-            rest = tuple(by[p] for p in places if p not in chosen)
-            yield (k, tuple(by[p] for p in chosen)), (k, rest)
+        for selected in combinations(indices, n):
+            remaining = tuple(by[p] for p in indices if p not in selected)
+            yield (k, tuple(by[p] for p in selected)), (k, remaining)
 
 
 def reduction(

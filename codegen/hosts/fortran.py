@@ -66,8 +66,8 @@ def _first_task(interface: ElementInterface) -> str:
 
 
 def _call(interface: ElementInterface, task: str) -> str:
-    given, results = column_major.lists(interface, task)
-    return f"{interface.name}_{task}({', '.join(a.name for a in [*given, *results])})"
+    inputs, results = column_major.lists(interface, task)
+    return f"{interface.name}_{task}({', '.join(a.name for a in [*inputs, *results])})"
 
 
 def source(interface: ElementInterface) -> str:
@@ -113,10 +113,10 @@ _C_ARGUMENTS = ("X", "u", "data", "p")
 
 def _interface(interface: ElementInterface, task: str) -> str:
     """Interface of a C function, with arrays of assumed size."""
-    given, results = column_major.lists(interface, task)
-    inputs = [a.name for a in given] if task == "commit" else [*_C_ARGUMENTS]
-    inputs += [a.name for a in column_major.direction(interface, task)]
-    names = ", ".join(["n", *inputs, *(a.name for a in results)])
+    inputs, results = column_major.lists(interface, task)
+    c_arguments = [a.name for a in inputs] if task == "commit" else [*_C_ARGUMENTS]
+    c_arguments += [a.name for a in column_major.direction(interface, task)]
+    names = ", ".join(["n", *c_arguments, *(a.name for a in results)])
     intent = "inout" if task == "commit" else "out"
     return "\n".join(
         [
@@ -124,7 +124,7 @@ def _interface(interface: ElementInterface, task: str) -> str:
             f"        bind(c, name='{interface.name}_{task}')",
             "      import :: c_double, c_size_t",
             "      integer(c_size_t), value :: n",
-            f"      real(c_double), intent(in) :: {', '.join(f'{a}(*)' for a in inputs)}",
+            f"      real(c_double), intent(in) :: {', '.join(f'{a}(*)' for a in c_arguments)}",
             f"      real(c_double), intent({intent}) :: "
             + ", ".join(f"{a.name}(*)" for a in results),
             "    end subroutine",
@@ -139,19 +139,19 @@ def _declared(a: Array, intent: str) -> str:
 
 def _procedure(interface: ElementInterface, task: str) -> str:
     """A procedure of the module: checks shapes, calls C, turns the tangent."""
-    given, results = column_major.lists(interface, task)
-    name, arrays = f"{interface.name}_{task}", [*given, *results]
+    inputs, results = column_major.lists(interface, task)
+    name, arrays = f"{interface.name}_{task}", [*inputs, *results]
     counted = "fields" if task == "commit" else "u"
     passed = {a.name for a in arrays}
-    inputs = [a.name for a in given] if task == "commit" else [*_C_ARGUMENTS]
-    inputs += [a.name for a in column_major.direction(interface, task)]
-    actual = [a if a in passed else "none" for a in inputs] + [a.name for a in results]
+    c_arguments = [a.name for a in inputs] if task == "commit" else [*_C_ARGUMENTS]
+    c_arguments += [a.name for a in column_major.direction(interface, task)]
+    actual = [a if a in passed else "none" for a in c_arguments] + [a.name for a in results]
     turned = any(a.name == "tangent" for a in results) and not interface.symmetric
     counted_rank = 3 if task == "commit" else 2
     lines = [
         f"  ! {'; '.join(f'{a.name}({bounds(a)}): {a.meaning}' for a in results)}.",
         f"  subroutine {_call(interface, task)}",
-        *(_declared(a, "in") for a in given),
+        *(_declared(a, "in") for a in inputs),
         *(_declared(a, "inout" if task == "commit" else "out") for a in results),
         "    integer :: n" + (", e" if turned else ""),
         *(["    real(c_double) :: none(1)"] if "none" in actual else []),
@@ -172,8 +172,8 @@ def _procedure(interface: ElementInterface, task: str) -> str:
 def _shapes(a: Array) -> str:
     """Name, shape and needed shape of an argument; of a longer one no more than it needs."""
     needed = ", ".join([*map(str, a.shape), *(["n"] if a.each else [])])
-    found = f"[min(size({a.name}), {needed})]" if a.longer else f"shape({a.name})"
-    return f"'{a.name}', {found}, [{needed}]"
+    shape = f"[min(size({a.name}), {needed})]" if a.longer else f"shape({a.name})"
+    return f"'{a.name}', {shape}, [{needed}]"
 
 
 def _numbers(values: Sequence[float]) -> str:
@@ -192,18 +192,18 @@ def _wrapped(texts: Sequence[str], width: int) -> str:
 def example(interface: ElementInterface, first: Sample) -> str:
     """Example program that calls one function for one element and prints the result."""
     task = _first_task(interface)
-    given, results = column_major.lists(interface, task)
-    given = column_major.with_length(given, [first])
+    inputs, results = column_major.lists(interface, task)
+    inputs = column_major.with_length(inputs, [first])
     s = first.state
     values = {"X": s.coordinates, "u": s.dofs, "data": first.data, "p": parameters_of(s)}
     declared = [
         f"  real(real8) :: {a.name}({', '.join([*map(str, a.shape), *(['1'] if a.each else [])])})"
-        for a in [*given, *results]
+        for a in [*inputs, *results]
     ]
     filled = [
         f"  {a.name} = reshape([ &\n    {_numbers([float(v) for v in values[a.name]])}], "
         f"shape({a.name}))"
-        for a in given
+        for a in inputs
     ]
     return "\n".join(
         [
@@ -225,16 +225,16 @@ def example(interface: ElementInterface, first: Sample) -> str:
 
 def test(interface: ElementInterface, references: Sequence[Sample]) -> str:
     """The test program."""
-    given = column_major.with_length(column_major.inputs(interface), references)
+    inputs = column_major.with_length(column_major.inputs(interface), references)
     order = column_major.expected(interface)
-    declared, read, spread = [], [], []
-    for a in given:
+    declared, read, copies = [], [], []
+    for a in inputs:
         shape = ", ".join(map(str, a.shape))
         if a.each:
             declared.append(f"  real(real8) :: {a.name}({shape}, n)")
             read.append(f"  allocate (page_{a.name}({shape}, samples))")
             declared.append(f"  real(real8), allocatable :: page_{a.name}({_colons(a)})")
-            spread.append(f"    {a.name}({_leading(a)}e) = page_{a.name}({_leading(a)}k)")
+            copies.append(f"    {a.name}({_leading(a)}e) = page_{a.name}({_leading(a)}k)")
         else:
             declared.append(f"  real(real8) :: page_{a.name}({shape}), {a.name}({shape})")
         read.append(f"  read (file, *) page_{a.name}")
@@ -242,7 +242,7 @@ def test(interface: ElementInterface, references: Sequence[Sample]) -> str:
         declared.append(f"  real(real8), allocatable :: page_{a.name}({_colons(a)})")
         read.append(f"  allocate (page_{a.name}({bounds(a).replace('n', 'samples')}))")
         read.append(f"  read (file, *) page_{a.name}")
-    if any(a.name == "p" for a in given):
+    if any(a.name == "p" for a in inputs):
         read.append("  p = page_p")
     checks = [_EXPECTED[t] for t in interface.tasks if t in _EXPECTED]
     smooth = not interface.definition.prescribed
@@ -261,8 +261,8 @@ def test(interface: ElementInterface, references: Sequence[Sample]) -> str:
             "name": interface.name,
             "declarations": "\n".join(declared),
             "read": "\n".join(read),
-            "spread": "\n".join(spread),
-            "inputs": ", ".join(a.name for a in given),
+            "spread": "\n".join(copies),
+            "inputs": ", ".join(a.name for a in inputs),
             "unknowns": s["UNKNOWNS"],
             "fields": s["FIELDS"],
             "points": s["POINTS"],
@@ -380,7 +380,7 @@ def _patch(interface: ElementInterface, references: Sequence[Sample]) -> dict[st
     assert interface.cell is not None
     s = c_interface.sizes(interface)
     state = s["POINTS"] * s["POINT_DATA"]
-    given = column_major.inputs(interface)
+    inputs = column_major.inputs(interface)
     fields = bool(interface.definition.fields) and Task.FIELDS in interface.tasks
     commit = [f"  call {interface.name}_commit(fields, data)"] * c_interface.commits(interface)
     commit += [f"  svars(:{state}) = data({s['DATA'] + 1}:, 1)"] * bool(state)
@@ -388,10 +388,10 @@ def _patch(interface: ElementInterface, references: Sequence[Sample]) -> dict[st
     substitutions = {
         "name": interface.name,
         "order": _wrapped([str(k + 1) for k in interface.by_node()], 20),
-        "inputs": ", ".join(a.name for a in given),
+        "inputs": ", ".join(a.name for a in inputs),
         "declarations": "\n".join(
             f"  real(real8) :: {a.name}({', '.join([*map(str, a.shape), *['1'][: a.each]])})"
-            for a in given
+            for a in inputs
             if a.name != "u"
         ),
         "coordinates": "" if s["DIMENSION"] == 0 else "  X(:, :, 1) = coords\n",
@@ -399,7 +399,7 @@ def _patch(interface: ElementInterface, references: Sequence[Sample]) -> dict[st
         "old": f"  data({s['DATA'] + 1}:, 1) = svars(:{state})\n" if state else "",
         "unknowns": s["UNKNOWNS"],
         "shape": f"{s['FIELDS']}, {s['POINTS']}",
-        "fields": f"  call {interface.name}_fields({', '.join(a.name for a in given)}, fields)\n"
+        "fields": f"  call {interface.name}_fields({', '.join(a.name for a in inputs)}, fields)\n"
         if fields
         else "",
         "commit": "".join(f"{line}\n" for line in commit),

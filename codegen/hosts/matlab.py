@@ -87,8 +87,8 @@ def _usage(interface: ElementInterface) -> list[str]:
 
 
 def _usage_of(interface: ElementInterface, task: str) -> str:
-    given, results = column_major.lists(interface, task)
-    right = [a.name for a in ([*given, *results] if task == "commit" else given)]
+    inputs, results = column_major.lists(interface, task)
+    right = [a.name for a in ([*inputs, *results] if task == "commit" else inputs)]
     left = ", ".join(a.name for a in results)
     left = f"[{left}]" if len(results) > 1 else left
     return f"{left} = {interface.name}('{task}', {', '.join(right)})"
@@ -96,19 +96,19 @@ def _usage_of(interface: ElementInterface, task: str) -> str:
 
 def _case(interface: ElementInterface, task: str) -> str:
     """Lines of C of one task: inputs, results, call."""
-    given, results = column_major.lists(interface, task)
+    inputs, results = column_major.lists(interface, task)
     commit = task == "commit"
-    inputs = [*given, *results] if commit else given
+    arrays = [*inputs, *results] if commit else inputs
     counted = "fields" if commit else "u"
-    k = [a.name for a in inputs].index(counted)
+    k = [a.name for a in arrays].index(counted)
     size = 1
-    for v in inputs[k].shape:
+    for v in arrays[k].shape:
         size *= v
     lines = [
         f'    if (strcmp(task, "{task}") == 0) {{',
-        f"        const size_t n = count(nrhs, prhs, {len(inputs)}, {k + 1}, {size});",
+        f"        const size_t n = count(nrhs, prhs, {len(arrays)}, {k + 1}, {size});",
     ]
-    for j, a in enumerate(inputs):
+    for j, a in enumerate(arrays):
         shape = ", ".join(map(str, a.shape)) or "1"
         lines += [
             f"        const size_t shape_{a.name}[] = {{{shape}}};",
@@ -130,7 +130,7 @@ def _case(interface: ElementInterface, task: str) -> str:
             f"        {name}((ptrdiff_t)n, fields, new_data);",
         ]
     else:
-        passed = {a.name for a in inputs}
+        passed = {a.name for a in arrays}
         actual = [a if a in passed else "NULL" for a in ("X", "u", "data", "p")]
         actual += [a.name for a in column_major.direction(interface, task)]
         actual += [a.name for a in results]
@@ -160,29 +160,29 @@ def _take(a: Array, target: str) -> str:
 
 def _checks(interface: ElementInterface) -> str:
     """Checks of the test for what the page offers."""
-    tasks, name, given = set(interface.tasks), interface.name, _inputs(interface)
+    tasks, name, inputs = set(interface.tasks), interface.name, _inputs(interface)
     unknowns = len(interface.definition.unknowns)
     lines = []
     if Task.ENERGY in tasks:
         lines += [
-            f"W = {name}('energy', {given});",
+            f"W = {name}('energy', {inputs});",
             f"failures = failures + say('energy', off(W, page.energy, turn), {LIMIT});",
         ]
     if Task.RESIDUAL in tasks:
         lines += [
-            f"R = {name}('residual', {given});",
+            f"R = {name}('residual', {inputs});",
             f"failures = failures + say('residual', off(R, page.residual, turn), {LIMIT});",
         ]
     if Task.TANGENT in tasks:
         lines += [
-            f"[R, K] = {name}('tangent', {given});",
+            f"[R, K] = {name}('tangent', {inputs});",
             "failures = failures + say('residual with tangent', off(R, page.residual, turn), "
             f"{LIMIT});",
             f"failures = failures + say('tangent', off(K, page.tangent, turn), {LIMIT});",
         ]
     if Task.FIELDS in tasks:
         lines += [
-            f"f = {name}('fields', {given});",
+            f"f = {name}('fields', {inputs});",
             f"failures = failures + say('fields', off(f, page.fields, turn), {LIMIT});",
         ]
     if c_interface.commits(interface):
@@ -196,13 +196,13 @@ def _checks(interface: ElementInterface) -> str:
         (Task.RESIDUAL, Task.TANGENT, "tangent by differences of residual"),
     ):
         if smooth and {value, slope} <= tasks:
-            place = "found(j, :)" if slope == Task.RESIDUAL else "found(:, j, :)"
+            target = "found(j, :)" if slope == Task.RESIDUAL else "found(:, j, :)"
             lines += [
                 "found = zeros(size(page." + slope + "(" + _all(slope) + "turn)));",
                 f"for j = 1:{unknowns}",
                 "  right = u; right(j, :) = right(j, :) + 1e-6;",
                 "  left = u; left(j, :) = left(j, :) - 1e-6;",
-                f"  {place} = ({name}('{value}', {_moved(interface, 'right')}) - "
+                f"  {target} = ({name}('{value}', {_moved(interface, 'right')}) - "
                 f"{name}('{value}', {_moved(interface, 'left')})) / 2e-6;",
                 "end",
                 f"failures = failures + say('{text}', off(found, page.{slope}, turn), "
@@ -211,7 +211,7 @@ def _checks(interface: ElementInterface) -> str:
     if Task.RESIDUAL in tasks:
         lines += [
             "lost = u; lost(:, 1) = NaN;",
-            f"R = {name}('residual', {given});",
+            f"R = {name}('residual', {inputs});",
             f"spoiled = {name}('residual', {_moved(interface, 'lost')});",
             "others = R(:, 2:end) - spoiled(:, 2:end);",
             "failures = failures + say('not-a-number stays in its element', "
@@ -238,7 +238,7 @@ def _patch(interface: ElementInterface, references: Sequence[Sample]) -> dict[st
     s = c_interface.sizes(interface)
     state = s["POINTS"] * s["POINT_DATA"]
     settings = host.settings_of(interface, references[0])
-    given, name = _inputs(interface), interface.name
+    inputs, name = _inputs(interface), interface.name
     substitutions = {
         "name": name,
         "order": ", ".join(str(k + 1) for k in interface.by_node()),
@@ -247,8 +247,8 @@ def _patch(interface: ElementInterface, references: Sequence[Sample]) -> dict[st
         "constants": s["DATA"],
         "state": state,
         "arguments": "".join(arguments(interface, IN_MATLAB)),
-        "inputs": given,
-        "commit": f"      data = {name}('commit', {name}('fields', {given}), data);\n"
+        "inputs": inputs,
+        "commit": f"      data = {name}('commit', {name}('fields', {inputs}), data);\n"
         if c_interface.commits(interface)
         else "",
     }

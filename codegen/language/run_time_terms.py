@@ -114,8 +114,8 @@ class Loop:
         call = f"m.{kind}(g, tau, lambda g, tau: ...)"
         if len(arguments) < 2 or not callable(arguments[-1]):
             raise ModelError(f"{kind}: give arrays, then a function of their entries: {call}")
-        *given, function = arguments
-        arrays = [a for g in given for a in (g if isinstance(g, (list, tuple)) else [g])]
+        *operands, function = arguments
+        arrays = [a for g in operands for a in (g if isinstance(g, (list, tuple)) else [g])]
         for a in arrays:
             if not isinstance(a, TermArray):
                 raise ModelError(f"{kind}: {a!r} is no array: declare it, g = m.array('g'); {call}")
@@ -123,9 +123,10 @@ class Loop:
         entries = Entries([sp.Dummy(a.name, real=True) for a in arrays], ("",) * len(arrays), list)
         label = symbols.numbered(str(kind))
         local = symbols.placeholders(label, entries)
-        rest = iter(entries.values)
+        remaining = iter(entries.values)
         shaped = [
-            [next(rest) for _ in g] if isinstance(g, (list, tuple)) else next(rest) for g in given
+            [next(remaining) for _ in g] if isinstance(g, (list, tuple)) else next(remaining)
+            for g in operands
         ]
         written = Entries.of(call_function(label, function, *shaped))
         values = [symbols.lower(e) for e in written.values]
@@ -216,10 +217,10 @@ def updates(
         slots = tuple(names.index(name) for name, _ in pairs)
         chosen = [k for _, k in pairs]
         for name, _ in pairs:
-            own = history[names.index(name)].terms_of
-            if own not in lengths:
+            array = history[names.index(name)].terms_of
+            if array not in lengths:
                 raise ModelError(
-                    f"history: {name} has a number for each term of {own}: loop over it"
+                    f"history: {name} has a number for each term of {array}: loop over it"
                 )
         results = loop.run(symbols, Kind.EACH, chosen, slots)
         dummies = [sp.Dummy(real=True) for _ in chosen]

@@ -209,13 +209,13 @@ def of_files(
     on = on or DEFAULT_CELL
     sources = [model_text.sources(p) for p in paths]
     runs = [model_loader.definitions_and_inputs(p, on) for p in paths]
-    found = [d for definitions, _ in runs for d in definitions]
-    model_loader.check_names(" ".join(p.name for p in paths), found)
+    models = [d for definitions, _ in runs for d in definitions]
+    model_loader.check_names(" ".join(p.name for p in paths), models)
     if len(paths) > 1:
-        return found, library(found, check=False)
+        return models, library(models, check=False)
     read = runs[0][1].beyond(paths[0], sources[0])
     key = None if read is None else _file_key(sources[0], on.options())
-    return found, library(found, key, read, check=False)
+    return models, library(models, key, read, check=False)
 
 
 def library(
@@ -289,10 +289,10 @@ class BuildProgress:
         self._timer.start()
 
 
-def _report(stage: str) -> None:
-    LOG.info(stage)
+def _report(message: str) -> None:
+    LOG.info(message)
     if sys.stderr.isatty() and multiprocessing.parent_process() is None:
-        print(f"softehl: {stage}", file=sys.stderr)
+        print(f"softehl: {message}", file=sys.stderr)
 
 
 def derive(

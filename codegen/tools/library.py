@@ -118,14 +118,14 @@ def entry(name: str, kind: str) -> Entry:
     Raises LibraryError.
     """
     plain = "_".join(name.lower().replace("-", " ").replace("_", " ").split())
-    found = entries().get(plain)
-    if found is not None and found.kind == kind:
-        return found
+    candidate = entries().get(plain)
+    if candidate is not None and candidate.kind == kind:
+        return candidate
     names = [e.name for e in entries().values() if e.kind == kind]
     close = difflib.get_close_matches(plain, names, n=2)
     hint = f"did you mean {' or '.join(close)}? " if close else ""
-    if found is not None:
-        hint = f"{plain} is a{'n' if found.kind == 'element' else ''} {found.kind}; "
+    if candidate is not None:
+        hint = f"{plain} is a{'n' if candidate.kind == 'element' else ''} {candidate.kind}; "
     raise LibraryError(f"no {kind} {name!r} in the library: {hint}softehl elements lists them")
 
 
@@ -167,10 +167,10 @@ def print_list() -> None:
 def _entry(path: Path) -> Entry:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     doc = (ast.get_docstring(tree) or "").strip()
-    summary, _, rest = doc.partition("\n")
+    summary, _, body = doc.partition("\n")
     notes = {"Cells": "", "Source": "", "Benchmark": ""}
     last = ""
-    for line in rest.splitlines():
+    for line in body.splitlines():
         label, colon, text = line.partition(":")
         if colon and label in notes:
             last, notes[label] = label, text.strip()

@@ -290,33 +290,35 @@ class Call:
             )
         return int(shape[1])
 
-    def _parameters(self, given: Any) -> Array:
+    def _parameters(self, parameters: Any) -> Array:
         """Parameters in order, with the arrays behind them."""
         kernel, count = self.kernel, len(self.kernel.parameters)
-        if not isinstance(given, Mapping):
+        if not isinstance(parameters, Mapping):
             if not kernel.arrays:
-                return self._array("parameters", given, (count,))
-            if not isinstance(given, np.ndarray) or not is_packed(given, count, len(kernel.arrays)):
+                return self._array("parameters", parameters, (count,))
+            if not isinstance(parameters, np.ndarray) or not is_packed(
+                parameters, count, len(kernel.arrays)
+            ):
                 names = [*kernel.parameters, *(a.name for a in kernel.arrays)]
                 raise ArgumentError(
                     f"{kernel.name} has curves or networks: give its parameters by name, "
                     f"parameters=dict({', '.join(f'{n}=...' for n in names)})"
                 )
-            return np.ascontiguousarray(given, dtype=np.float64)
+            return np.ascontiguousarray(parameters, dtype=np.float64)
         needed = [*kernel.parameters, *(a.name for a in kernel.arrays)]
-        given = {**kernel.addresses, **given}
-        missing = [p for p in needed if p not in given]
+        parameters = {**kernel.addresses, **parameters}
+        missing = [p for p in needed if p not in parameters]
         if missing:
             raise ArgumentError(f"{kernel.name} needs {', '.join(missing)}")
         try:
             ordered = [
-                address_of(p, given[p]) if p in kernel.functions else given[p]
+                address_of(p, parameters[p]) if p in kernel.functions else parameters[p]
                 for p in kernel.parameters
             ]
         except FunctionAddressError as error:
             raise ArgumentError(f"{kernel.name}: {error}") from None
         numbers = self._array("parameters", ordered, (count,))
-        return kernel.with_arrays(numbers, given) if kernel.arrays else numbers
+        return kernel.with_arrays(numbers, parameters) if kernel.arrays else numbers
 
     def _array(self, what: str, value: Any, shape: tuple[int, ...]) -> Array:
         if isinstance(value, np.ma.MaskedArray):

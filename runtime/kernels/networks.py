@@ -201,29 +201,29 @@ def weights_of(array: RunTimeArray, given: Any) -> Weights:
     return weights
 
 
-def _layers(shape: NetworkShape, given: Any) -> Layers:
+def _layers(shape: NetworkShape, weights: Any) -> Layers:
     """Layers of a list, a mapping of PyTorch or Flax, or one array.  Raises `ArrayDataError`."""
-    if isinstance(given, Mapping):
-        given = _of_mapping(given)
+    if isinstance(weights, Mapping):
+        weights = _of_mapping(weights)
     expected = [" ".join(str(s) for s in shapes) for shapes in shape.shapes]
     message = (
         f"each of {len(shape.shapes)} layers has weights (to, from) and biases: "
         f"shapes {'; '.join(expected)}"
     )
-    if isinstance(given, np.ndarray) and given.ndim == 1:
-        if given.shape != shape.least.shape:
-            raise ArrayDataError(f"{message}; given {given.shape}, or {shape.least.shape} in one")
-        return shape.split(given.astype(np.float64))
-    if not isinstance(given, (list, tuple)):
-        raise ArrayDataError(f"{message}; given {type(given).__name__}")
-    layers = [tuple(_array(part) for part in layer) for layer in given]
-    found = [" ".join(str(part.shape) for part in layer) for layer in layers]
-    if found != expected:
+    if isinstance(weights, np.ndarray) and weights.ndim == 1:
+        if weights.shape != shape.least.shape:
+            raise ArrayDataError(f"{message}; given {weights.shape}, or {shape.least.shape} in one")
+        return shape.split(weights.astype(np.float64))
+    if not isinstance(weights, (list, tuple)):
+        raise ArrayDataError(f"{message}; given {type(weights).__name__}")
+    layers = [tuple(_array(part) for part in layer) for layer in weights]
+    actual = [" ".join(str(part.shape) for part in layer) for layer in layers]
+    if actual != expected:
         turned = [[part.T.shape for part in layer] for layer in layers]
         hint = ""
         if turned == [[tuple(s) for s in shapes] for shapes in shape.shapes]:
             hint = "; transposed, as kernels of Flax: give its mapping, or W.T"
-        raise ArrayDataError(f"{message}; given {'; '.join(found)}{hint}")
+        raise ArrayDataError(f"{message}; given {'; '.join(actual)}{hint}")
     return layers
 
 
@@ -237,14 +237,14 @@ def _array(part: Any) -> Array:
         raise ArrayDataError(f"{type(part).__name__} is no array of numbers") from None
 
 
-def _of_mapping(given: Mapping[str, Any]) -> list[tuple[Any, ...]]:
+def _of_mapping(weights: Mapping[str, Any]) -> list[tuple[Any, ...]]:
     """Layers of a state_dict of PyTorch or of parameters of Flax, in the order of their numbers."""
-    while set(given) == {"params"}:
-        given = given["params"]
-    if given and all(isinstance(v, Mapping) for v in given.values()):
-        return [_of_flax(key, given[key]) for key in sorted(given, key=_number)]
+    while set(weights) == {"params"}:
+        weights = weights["params"]
+    if weights and all(isinstance(v, Mapping) for v in weights.values()):
+        return [_of_flax(key, weights[key]) for key in sorted(weights, key=_number)]
     stems: dict[str, dict[str, Any]] = {}
-    for key, value in given.items():
+    for key, value in weights.items():
         stem, _, kind = str(key).rpartition(".")
         stems.setdefault(stem, {})[kind] = value
     out = []
@@ -271,5 +271,5 @@ def _of_flax(key: str, layer: Mapping[str, Any]) -> tuple[Any, ...]:
 
 def _number(key: str) -> tuple[str, int]:
     """Key of the order Dense_2, Dense_10."""
-    found = re.search(r"(\d+)$", key)
-    return (key[: found.start()], int(found[1])) if found else (key, -1)
+    digits = re.search(r"(\d+)$", key)
+    return (key[: digits.start()], int(digits[1])) if digits else (key, -1)

@@ -147,14 +147,14 @@ class Table:
         """Coefficients (m + 1, 4), and their derivatives (m + 1, 4, k) along `moving` (m, k)."""
         dy = np.zeros((len(y), 0)) if moving is None else moving
         h = np.diff(self.x)
-        slopes, d_slopes = self._slopes(h, y, dy)
-        rows, d_rows = _hermite(h, y, slopes), _hermite(h, dy, d_slopes)
-        first, last = self._end(y, slopes, 0), self._end(y, slopes, -1)
-        d_first, d_last = self._end(dy, d_slopes, 0), self._end(dy, d_slopes, -1)
-        whole = np.concatenate([first[None], rows, last[None]])
-        return whole, np.concatenate([d_first[None], d_rows, d_last[None]])
+        dydx, d_dydx = self._derivatives(h, y, dy)
+        rows, d_rows = _hermite(h, y, dydx), _hermite(h, dy, d_dydx)
+        first, last = self._end(y, dydx, 0), self._end(y, dydx, -1)
+        d_first, d_last = self._end(dy, d_dydx, 0), self._end(dy, d_dydx, -1)
+        coefficients = np.concatenate([first[None], rows, last[None]])
+        return coefficients, np.concatenate([d_first[None], d_rows, d_last[None]])
 
-    def _slopes(self, h: Array, y: Array, dy: Array) -> tuple[Array, Array]:
+    def _derivatives(self, h: Array, y: Array, dy: Array) -> tuple[Array, Array]:
         """Slopes at the points (m,), of a line in the sense of its last interval, and rates."""
         if self.interpolation == "spline":
             A, B = _spline_equations(h, natural=self.ends == "natural")
@@ -165,14 +165,14 @@ class Table:
             return _pchip(h, secants, d_secants)
         return secants, d_secants
 
-    def _end(self, y: Array, slopes: Array, k: int) -> Array:
+    def _end(self, y: Array, dydx: Array, k: int) -> Array:
         """Coefficients outside, (4,) or (4, k)."""
         row = np.zeros((4, *y.shape[1:]))
         row[0] = y[k]
         if self.outside == "error":
             row[0] = np.nan
         elif self.outside == "linear":
-            row[1] = slopes[k]
+            row[1] = dydx[k]
         return row
 
 
@@ -197,17 +197,17 @@ def _points(x: Any, y: Any) -> tuple[Array, Array]:
     return x, y
 
 
-def _hermite(h: Array, y: Array, slopes: Array) -> Array:
+def _hermite(h: Array, y: Array, dydx: Array) -> Array:
     """Cubics of the intervals, (m - 1, 4) or (m - 1, 4, k), by values and slopes; lines by secants.
 
     Of a line there is one slope for each interval.
     """
     h = h.reshape(-1, *[1] * (y.ndim - 1))
     secants = np.diff(y, axis=0) / h
-    if len(slopes) < len(y):
+    if len(dydx) < len(y):
         zero = np.zeros_like(secants)
         return np.stack([y[:-1], secants, zero, zero], axis=1)
-    a, b = slopes[:-1], slopes[1:]
+    a, b = dydx[:-1], dydx[1:]
     second = (3.0 * secants - 2.0 * a - b) / h
     third = (a + b - 2.0 * secants) / h**2
     return np.stack([y[:-1], a, second, third], axis=1)
@@ -222,20 +222,20 @@ def _spline_equations(h: Array, *, natural: bool) -> tuple[Array, Array]:
         A[k, k - 1 : k + 2] = p, 2.0 * (p + q), q
         B[k, k - 1 : k + 2] = -3.0 * p * p, 3.0 * (p * p - q * q), 3.0 * q * q
     for end, inward in ((0, 1), (m - 1, -1)):
-        near, next_ = (h[0], h[min(1, m - 2)]) if end == 0 else (h[-1], h[max(-2, 1 - m)])
+        h0, h1 = (h[0], h[min(1, m - 2)]) if end == 0 else (h[-1], h[max(-2, 1 - m)])
         a, b = end + inward, end + 2 * inward
         if natural or m == 2:
             A[end, end], A[end, a] = 2.0, 1.0
-            B[end, end], B[end, a] = -3.0 * inward / near, 3.0 * inward / near
+            B[end, end], B[end, a] = -3.0 * inward / h0, 3.0 * inward / h0
         elif m == 3:  # one parabola
             if end == 0:
                 A[0, :2] = 1.0, 1.0
-                B[0, :2] = -2.0 / near, 2.0 / near
+                B[0, :2] = -2.0 / h0, 2.0 / h0
             else:
                 A[2, 1:] = 1.0, 1.0
-                B[2, 1:] = -2.0 / near, 2.0 / near
+                B[2, 1:] = -2.0 / h0, 2.0 / h0
         else:  # equal third derivatives on both sides of the second point
-            p, q = 1.0 / near, 1.0 / next_
+            p, q = 1.0 / h0, 1.0 / h1
             A[end, [end, a, b]] = p * p, p * p - q * q, -q * q
             factor = 2.0 * inward
             B[end, [end, a, b]] = -factor * p**3, factor * (p**3 + q**3), -factor * q**3

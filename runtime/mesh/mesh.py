@@ -691,15 +691,15 @@ class Mesh:
         MeshError
             There is no node, with the nearest one in the message; or there are several.
         """
-        place = self._placed(place)
-        distance = np.linalg.norm(self.points - place, axis=1)
+        point = self._placed(place)
+        distance = np.linalg.norm(self.points - point, axis=1)
         nearest = int(distance.argmin())
         if distance[nearest] > _NEAR * self._size:
             raise MeshError(
-                f"no node at {place_text(place)}; the nearest is number {nearest} at "
+                f"no node at {place_text(point)}; the nearest is number {nearest} at "
                 f"{place_text(self.points[nearest])}"
             )
-        self._require_one(np.flatnonzero(distance <= _NEAR * self._size), place)
+        self._require_one(np.flatnonzero(distance <= _NEAR * self._size), point)
         return nearest
 
     def nodes_at(self, place: Array) -> Integers:
@@ -720,23 +720,23 @@ class Mesh:
         MeshError
             There is no node on any process, or there are nodes of several bodies.
         """
-        place = self._placed(place)
-        mask = np.linalg.norm(self.points - place, axis=1) <= _NEAR * self._size
+        point = self._placed(place)
+        mask = np.linalg.norm(self.points - point, axis=1) <= _NEAR * self._size
         nodes = np.flatnonzero(mask)
         if self.piece is not None:
             nodes = self.piece.everywhere(nodes)
             if not self.anywhere(len(nodes)):
-                raise MeshError(f"no node at {place_text(place)}, in any part of the mesh")
+                raise MeshError(f"no node at {place_text(point)}, in any part of the mesh")
         elif self.numbers is None or not len(nodes):
             return np.array([self.node_at(place)])
         if len(np.unique(self.origin[nodes])) > 1:
-            self._require_one(nodes, place)
+            self._require_one(nodes, point)
         return nodes
 
-    def _require_one(self, nodes: Integers, place: Array) -> None:
+    def _require_one(self, nodes: Integers, point: Array) -> None:
         if len(nodes) > 1:
             raise MeshError(
-                f"{len(nodes)} nodes are at {place_text(place)}: name one by its number, "
+                f"{len(nodes)} nodes are at {place_text(point)}: name one by its number, "
                 f"{join_names(map(str, nodes))}, or a side of one body"
             )
 
@@ -787,16 +787,16 @@ class Mesh:
         MeshError
             There is no such group, or places have a wrong shape.
         """
-        places = np.asarray(places, dtype=np.float64)
-        if places.ndim != 2 or places.shape[1] != self.dimension or not np.isfinite(places).all():
-            places = np.stack([self._placed(point) for point in places])
+        points = np.asarray(places, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != self.dimension or not np.isfinite(points).all():
+            points = np.stack([self._placed(point) for point in points])
         if group is None:
-            return self._locator.holding(places)
+            return self._locator.holding(points)
         self.cells_of(group)
         masks = {kind: np.zeros(len(nodes), np.bool_) for kind, nodes in self.cells.items()}
         for kind, rows in self.groups[group].items():
             masks[kind][rows] = True
-        return self._locator.holding(places, masks)
+        return self._locator.holding(points, masks)
 
     @cached_property
     def _locator(self) -> PointLocator:
@@ -808,11 +808,11 @@ class Mesh:
     def _size(self) -> float:
         return float(np.ptp(self.points, axis=0).max())
 
-    def _placed(self, given: Array) -> Array:
+    def _placed(self, coordinates: Array) -> Array:
         """A place as an array, which may be given as a tuple.  Raises MeshError."""
-        if isinstance(given, np.ma.MaskedArray) or np.asarray(given).dtype == np.bool_:
-            raise MeshError(f"a place has {self.dimension} numbers, given {given!r}")
-        point = np.asarray(given, dtype=np.float64)
+        if isinstance(coordinates, np.ma.MaskedArray) or np.asarray(coordinates).dtype == np.bool_:
+            raise MeshError(f"a place has {self.dimension} numbers, given {coordinates!r}")
+        point = np.asarray(coordinates, dtype=np.float64)
         if point.shape != (self.dimension,) or not np.isfinite(point).all():
             raise MeshError(f"a place has {self.dimension} coordinates, given {point.tolist()}")
         return point
@@ -840,11 +840,11 @@ class Mesh:
         return present
 
 
-def _frozen(name: str, given: Any) -> NDArray[Any]:
+def _frozen(name: str, array: Any) -> NDArray[Any]:
     """An array of numbers that nobody can write to.  Raises MeshError."""
-    if isinstance(given, np.ma.MaskedArray):
+    if isinstance(array, np.ma.MaskedArray):
         raise MeshError(f"{name} are a masked array, whose mask says nothing here: fill it first")
-    return frozen(np.asarray(given))
+    return frozen(np.asarray(array))
 
 
 def _owned(arrays: Mapping[str, Any], context: str) -> Mapping[str, Any]:
@@ -852,15 +852,15 @@ def _owned(arrays: Mapping[str, Any], context: str) -> Mapping[str, Any]:
     return MappingProxyType({k: _frozen(f"{context}{k}", n) for k, n in arrays.items()})
 
 
-def _evaluate_predicate(where: Predicate, places: Array, name: str) -> Flags:
+def _evaluate_predicate(where: Predicate, points: Array, name: str) -> Flags:
     signature_error = misfit(where, "x")
     if signature_error:
         raise MeshError(f"{name}: {signature_error}, x of shape (n, dim)")
-    selected = np.asarray(where(places))
-    if selected.shape != (len(places),) or selected.dtype != np.bool_:
+    selected = np.asarray(where(points))
+    if selected.shape != (len(points),) or selected.dtype != np.bool_:
         raise MeshError(
-            f"{name}: a predicate takes places of shape {places.shape} and gives booleans of shape "
-            f"({len(places)},); this one gave {selected.dtype} of shape {selected.shape}"
+            f"{name}: a predicate takes places of shape {points.shape} and gives booleans of shape "
+            f"({len(points)},); this one gave {selected.dtype} of shape {selected.shape}"
         )
     return selected
 

@@ -140,10 +140,10 @@ def recover_by_patches(
     """Nodal values (points, f) of fields (cells, q, f) by patches; nan at nodes of no cell."""
     at = superconvergent_points(cell)
     values = np.einsum("sq,nqf->nsf", projection(cell, rule, cell.order - 1, at), fields)
-    places = np.einsum("sk,nkd->nsd", cell.shape(at), points[nodes])
+    sampling_points = np.einsum("sk,nkd->nsd", cell.shape(at), points[nodes])
     vertices, corners = np.unique(nodes[:, : cell.corners], return_inverse=True)
     corners = corners.reshape(len(nodes), cell.corners)
-    patches = _Patches(points[vertices], corners, places, values, cell.order)
+    patches = _Patches(points[vertices], corners, sampling_points, values, cell.order)
     return patches.nodal_values(points, nodes, cell.corner_shape)
 
 
@@ -162,7 +162,7 @@ class _Patches:
     """
 
     def __init__(
-        self, vertices: Array, corners: Integers, places: Array, values: Array, degree: int
+        self, vertices: Array, corners: Integers, sampling_points: Array, values: Array, degree: int
     ) -> None:
         self.corners, self.vertices, self.centres = corners, vertices, vertices.copy()
         powers = product(range(degree + 1), repeat=vertices.shape[1])
@@ -172,10 +172,10 @@ class _Patches:
         self.coefficients = np.zeros((count, len(self.powers), values.shape[2]))
         pairs = np.repeat(np.arange(cells), corners.shape[1])
         incidence = csr_array((np.ones(corners.size), (corners.ravel(), pairs)), (count, cells))
-        waiting, patches = self._fit(np.arange(count), incidence, places, values, degree)
-        before = count
-        while 0 < len(waiting) < before:
-            before = len(waiting)
+        waiting, patches = self._fit(np.arange(count), incidence, sampling_points, values, degree)
+        previous = count
+        while 0 < len(waiting) < previous:
+            previous = len(waiting)
             waiting, patches = self._copy_nearest(waiting, patches, incidence)
         neighbours = (incidence.T @ incidence).tocsr()
         for lower in range(degree, -1, -1):
@@ -183,7 +183,7 @@ class _Patches:
                 if not len(waiting):
                     return
                 patches = (patches @ neighbours).tocsr()
-                waiting, patches = self._fit(waiting, patches, places, values, lower)
+                waiting, patches = self._fit(waiting, patches, sampling_points, values, lower)
 
     def _copy_nearest(
         self, waiting: Integers, patches: Any, incidence: Any
@@ -191,43 +191,43 @@ class _Patches:
         """Copy the polynomial of the nearest vertex that has one; returns vertices without any."""
         has_polynomial = np.ones(len(self.vertices), dtype=bool)
         has_polynomial[waiting] = False
-        beside = (patches @ incidence.T).tocoo()
-        allowed = has_polynomial[beside.col]
-        rows, others = beside.row[allowed], beside.col[allowed]
+        adjacent = (patches @ incidence.T).tocoo()
+        allowed = has_polynomial[adjacent.col]
+        rows, others = adjacent.row[allowed], adjacent.col[allowed]
         distance = np.linalg.norm(self.vertices[waiting[rows]] - self.vertices[others], axis=1)
         order = np.lexsort((distance, rows))
-        found, first = np.unique(rows[order], return_index=True)
-        source, target = others[order][first], waiting[found]
+        indices, first = np.unique(rows[order], return_index=True)
+        source, target = others[order][first], waiting[indices]
         for array in (self.centres, self.scales, self.coefficients):
             array[target] = array[source]
-        left = np.setdiff1d(np.arange(len(waiting)), found)
+        left = np.setdiff1d(np.arange(len(waiting)), indices)
         return waiting[left], patches[left]
 
     def _fit(
-        self, waiting: Integers, patches: Any, places: Array, values: Array, degree: int
+        self, waiting: Integers, patches: Any, sampling_points: Array, values: Array, degree: int
     ) -> tuple[Integers, Any]:
         """Fit polynomials of a degree; returns the vertices whose patch is too small."""
         length = sum(sum(e) <= degree for e in self.powers)
-        least = _INDEPENDENT * self._ratio_of_cube(degree)
+        min_ratio = _INDEPENDENT * self._ratio_of_cube(degree)
         left = []
         for begin in range(0, len(waiting), _PIECE):
             rows = patches[begin : begin + _PIECE].tocsr()
-            chosen = waiting[begin : begin + _PIECE]
+            batch = waiting[begin : begin + _PIECE]
             starts, cells = rows.indptr[:-1], rows.indices
-            owner = np.repeat(np.arange(len(chosen)), np.diff(rows.indptr))
+            owner = np.repeat(np.arange(len(batch)), np.diff(rows.indptr))
             around = self.vertices[self.corners[cells]]  # corners of the cells
             number = np.diff(np.append(starts, len(cells)))[:, None] * around.shape[1]
             centres = np.add.reduceat(around.sum(axis=1), starts) / number
             around -= centres[owner][:, None, :]
             squares = np.add.reduceat(np.einsum("pqd,pqe->pde", around, around), starts)
             scales = _scales(squares / number[..., None])
-            away = places[cells] - centres[owner][:, None, :]
+            away = sampling_points[cells] - centres[owner][:, None, :]
             P = self._basis(np.einsum("pqd,pde->pqe", away, scales[owner]))[..., :length]
             moments = np.add.reduceat(np.einsum("pqi,pqj->pij", P, P), starts)
             loads = np.add.reduceat(np.einsum("pqi,pqf->pif", P, values[cells]), starts)
             eigenvalues = np.linalg.eigvalsh(moments)
-            sound = eigenvalues[:, 0] > least * eigenvalues[:, -1]
-            done = chosen[sound]
+            sound = eigenvalues[:, 0] > min_ratio * eigenvalues[:, -1]
+            done = batch[sound]
             self.centres[done], self.scales[done] = centres[sound], scales[sound]
             self.coefficients[done, :length] = np.linalg.solve(moments[sound], loads[sound])
             left.append(begin + np.flatnonzero(~sound))
@@ -251,12 +251,14 @@ class _Patches:
         total = np.zeros((len(points), self.coefficients.shape[2]))
         count = np.bincount(nodes.ravel(), minlength=len(points))
         for c in range(self.corners.shape[1]):
-            near = np.flatnonzero(corner_shape[:, c])  # nodes at which this corner counts
+            local_nodes = np.flatnonzero(corner_shape[:, c])  # nodes at which this corner counts
             vertex = self.corners[:, c]
-            away = points[nodes[:, near]] - self.centres[vertex][:, None, :]
+            away = points[nodes[:, local_nodes]] - self.centres[vertex][:, None, :]
             basis = self._basis(np.einsum("nkd,nde->nke", away, self.scales[vertex]))
             parts = np.einsum("nkm,nmf->nkf", basis, self.coefficients[vertex])
-            np.add.at(total, nodes[:, near], parts * corner_shape[near, c][None, :, None])
+            np.add.at(
+                total, nodes[:, local_nodes], parts * corner_shape[local_nodes, c][None, :, None]
+            )
         with np.errstate(invalid="ignore"):
             return np.where(count[:, None] > 0, total / count[:, None], np.nan)
 
