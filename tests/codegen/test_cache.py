@@ -169,6 +169,7 @@ def test_what_is_damaged_is_built_anew(damage: str) -> None:
         (folder / "spring.c").unlink()
     else:
         for path in folder.iterdir():
+            path.unlink()  # this process has the library mapped
             path.write_bytes(b"")
     assert kernel_cache.folder_of(Path("spring.py")) == folder
     assert {p.name: p.read_bytes() for p in folder.iterdir() if p.name != LIBRARY} == original

@@ -39,6 +39,8 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     ((), _again, "prescribed twice"),
     (("hessian",), lambda at: at.load == "weight", "comes as C without second derivatives"),
     (("hessian",), lambda at: at.law == "learned", "no third derivatives"),
+    (("hessian",), lambda at: at.law == "softened", "history of each term"),
+    (("hessian",), lambda at: at.law == "split", "a third derivative of m.isotropic"),
     (
         ("static state", "equilibrium"),
         lambda at: at.analysis == "explicit" and _mixed(at),
