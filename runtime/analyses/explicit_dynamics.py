@@ -87,7 +87,8 @@ class ExplicitMarch:
         forces = Forces.of(end, x, body.roles)
         if self.body.comm.max(float(not np.isfinite(forces.total).all())):
             where = body.comm.distribute(end).where_not_finite(x)
-            message = f"t = {t:.6g}: the forces are not finite{where}"
+            place = where and f": {where}"
+            message = f"t = {t:.6g}: the forces are not finite{place}"
             state = Solution(initial.x, Status.NOT_FINITE, message, (), 0, 0)
             raise NotConverged(Branch((Point(initial.t, state),), Status.NOT_FINITE, message))
         a = self._accelerations(forces.total)

@@ -49,7 +49,7 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     (
         ("static state",),  # the stable step before an extension is that of a shortening
         lambda at: at.analysis == "explicit" and at.law == "split",
-        "come from the scheme",
+        "come from the scheme|forces are not finite: element",
     ),
     (("tied halves",), lambda at: at.solver == "amg", "multigrid needs"),
     (("tied halves",), lambda at: at.constraint == "tied sides", "tied in a circle"),
