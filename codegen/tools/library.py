@@ -117,8 +117,7 @@ def entry(name: str, kind: str) -> Entry:
 
     Raises LibraryError.
     """
-    plain = "_".join(name.lower().replace("-", " ").replace("_", " ").split())
-    candidate = entries().get(plain)
+    plain, candidate = _plain(name), _candidate(name)
     if candidate is not None and candidate.kind == kind:
         return candidate
     names = [e.name for e in entries().values() if e.kind == kind]
@@ -130,11 +129,19 @@ def entry(name: str, kind: str) -> Entry:
 
 
 def has(name: str, kind: str) -> bool:
-    """True if the library has an entry of this name and kind."""
-    try:
-        return bool(entry(name, kind))
-    except LibraryError:
-        return False
+    """True if the library has an entry of this name and kind; no other file is read."""
+    candidate = _candidate(name)
+    return candidate is not None and candidate.kind == kind
+
+
+def _plain(name: str) -> str:
+    return "_".join(name.lower().replace("-", " ").replace("_", " ").split())
+
+
+def _candidate(name: str) -> Entry | None:
+    """The entry of a name, of any kind."""
+    path = FOLDER / f"{_plain(name)}.py"
+    return _entry(path) if _plain(name).isidentifier() and path.is_file() else None
 
 
 def text_of(name: str) -> str:
@@ -164,6 +171,7 @@ def print_list() -> None:
             print()
 
 
+@cache
 def _entry(path: Path) -> Entry:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     doc = (ast.get_docstring(tree) or "").strip()
