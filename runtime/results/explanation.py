@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from softehl.errors import UnknownNameError
 from softehl.runtime.arrays import Array
-from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.kernels.explanation import Explanation
 from softehl.runtime.suggestions import did_you_mean, join_names
@@ -28,11 +29,17 @@ def explain_element(
     if block is None and len(names) > 1:
         raise StudyError(f"explain: say in which block, block=...: {join_names(names)}")
     name = names[0] if block is None else block
-    if name not in names:
-        raise UnknownNameError(
-            f"no block {name!r}{did_you_mean(name, names)}; there are {join_names(names)}"
-        )
+    block_called(system.blocks, name)
     return problem.assembler.block(name).explain(x, problem.parameters[name], element)
+
+
+def block_called(blocks: Mapping[str, Block], name: str) -> Block:
+    """The block of a name.  Raises UnknownNameError, a KeyError, that names what there is."""
+    if name not in blocks:
+        raise UnknownNameError(
+            f"no block {name!r}{did_you_mean(name, blocks)}; there are {join_names(blocks)}"
+        )
+    return blocks[name]
 
 
 def explain_at(

@@ -13,6 +13,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.plotting import Picture, import_pyvista, picture_file, show_or_save
+from softehl.runtime.results.explanation import block_called
 from softehl.runtime.results.tensors import von_mises
 from softehl.runtime.suggestions import did_you_mean, join_names
 
@@ -85,11 +86,8 @@ def _values(result: Result, name: str, block: str | None, recovery: str) -> tupl
         parts = [np.nan_to_num(result.values(c)) for c in components]
         return np.linalg.norm(parts, axis=0), f"|{name}|"
     if block is not None:
-        result.fields(block)  # an error names the blocks that there are
-    total, count = (
-        np.zeros(len(result.system.mesh.points)),
-        np.zeros(len(result.system.mesh.points)),
-    )
+        block_called(blocks, block)
+    total, count = np.zeros((2, len(result.system.mesh.points)))
     known: dict[str, None] = dict.fromkeys(nodal)
     for b in [block] if block is not None else list(blocks):
         if not blocks[b].kernel.fields or not CELLS[blocks[b].kind].dimension:

@@ -29,7 +29,7 @@ from softehl.runtime.kernels.explanation import Explanation
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError, place_text
 from softehl.runtime.mesh.plotting import picture_file, show_or_save
-from softehl.runtime.results.explanation import explain_element
+from softehl.runtime.results.explanation import block_called, explain_element
 from softehl.runtime.results.output import VtuFields, piece_names
 from softehl.runtime.results.plotting import picture_of
 from softehl.runtime.results.recovery import nodal_operator, recover_block
@@ -334,13 +334,7 @@ class Result:
 
     def _block(self, name: str) -> Block:
         """The block of a name, of all processes.  Raises KeyError that names what there is."""
-        blocks = self._global_system.blocks
-        if name not in blocks:
-            existing = join_names(blocks)
-            raise UnknownNameError(
-                f"no block {name!r}{did_you_mean(name, blocks)}; there are {existing}"
-            )
-        return blocks[name]
+        return block_called(self._global_system.blocks, name)
 
     def _local_fields(self, block: str) -> dict[str, Array]:
         """Fields at the points of this process's elements."""
