@@ -54,8 +54,11 @@ class FolderLock:
         """Release the lock."""
         self.release()
 
-    def take(self, patience: float = 0.0) -> None:
+    def take(self, patience: float = 2.0) -> None:
         """Take the lock of an existing folder; taking it again has no effect.
+
+        The system releases the lock of a killed process when the process has ended, a moment after
+        the signal: `patience` covers this.
 
         Raises `error` that names the owner after `patience` seconds, OSError if the folder cannot
         be written to.

@@ -23,7 +23,8 @@ from typing import Any
 import softehl
 
 _FENCE = re.compile(r"^```(\S+)[ ]?([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-_NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
+_NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?|\bcached\b")
+"""A number, or the word that a table has for the seconds of a kernel built before."""
 
 
 @dataclass(frozen=True)

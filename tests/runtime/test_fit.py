@@ -89,7 +89,7 @@ def test_newton_where_the_panel_cannot_be_as_measured() -> None:
     """Large residuals: the same values as Gauss-Newton, in fewer evaluations."""
     measured: Any = displacements(truth()[-1])
     for place, row in measured.items():
-        row["u_y"] *= 0.8 if place is PLACES[1] else 1.2
+        row["u_y"] *= 1.3 if place is PLACES[1] else 0.6
     fits = [
         cook(0.5, 0.7).fit(measured, by=BY, steps=4, method=method)
         for method in ("gauss-newton", "newton")
