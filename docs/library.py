@@ -19,16 +19,30 @@ from tests.library.every import BENCHMARKS  # noqa: E402
 PAGE, NUMBERS = HERE / "library.md", HERE / "library.json"
 INTRODUCTION = """# The library of elements and laws
 
+`study.add("bar", element="truss", E=210e3, A=20.0)` and
+`study.add("body", material="hencky", mu=0.4, kappa=2.0)` take an element and a law by name. Each is
+a model file of at most 80 lines, derived and compiled at its first use. `softehl elements` lists
+names, unknowns and parameters with units. `softehl elements --show truss` prints the file: copy it
+as the start of a page of your own, or give it to `softehl generate` for another program. Every
+entry is compared with a number from elsewhere; the tests run the same comparisons.
+
+A whole study of a frame, with its mesh of straight members:
+
 ```python
-study.add("bar", element="truss", E=210e3, A=20.0)
-study.add("body", material="hencky", mu=0.4, kappa=2.0)
+from softehl import Mesh, Study
+
+portal = Mesh.frame([(0, 0), (0, 3000), (4000, 3000), (4000, 0)], cells=16)
+study = Study(portal)
+study.add("frame", element="beam2d_reissner", EA=1e9, GA=1e9, EI=1e12)
+study.fix((0, 0), u_x=0, u_y=0, theta=0)
+study.fix((4000, 0), u_x=0, u_y=0, theta=0)
+study.load((0, 3000), u_x=1000)
+print(f"sway {study.solve().at((0, 3000))['u_x']:.2f} mm")
 ```
 
-An element or law of the library is a model file of at most 80 lines, derived and compiled at its
-first use. `softehl elements` lists names, unknowns and parameters with units. `softehl elements
---show truss` prints the file: copy it as the start of a page of your own, or give it to `softehl
-generate` for another program. Every entry is compared with a number from elsewhere; the tests run
-the same comparisons.
+```text
+sway 1.74 mm
+```
 
 """
 

@@ -233,10 +233,15 @@ def facet_nodes(kernel: Kernel) -> Integers | None:
 
 def _require_fit(mesh: Mesh, kernel: Kernel) -> None:
     if kernel.coordinates and len(kernel.coordinates) != mesh.dimension:
-        raise StudyError(
+        text = (
             f"{kernel.name} has {len(kernel.coordinates)} coordinates a node "
             f"({', '.join(kernel.coordinates)}), the mesh has {mesh.dimension}"
         )
+        if mesh.dimension == 1:
+            text += "; Mesh.frame(points, cells=...) makes lines in the plane and in space"
+        elif mesh.dimension < len(kernel.coordinates):
+            text += "; mesh.map(lambda x: ...) may return points with more coordinates"
+        raise StudyError(text)
 
 
 def _arguments(kernel: Kernel) -> list[str]:

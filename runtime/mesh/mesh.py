@@ -181,22 +181,18 @@ class Mesh:
     @classmethod
     def rectangle(
         cls,
-        width: float,
-        height: float,
-        *,
+        *size: float | Sequence[float],
         cells: tuple[int, int],
         order: int = 1,
         shape: Shape = "quad",
         spread: bool = False,
     ) -> Mesh:
-        """Return [0, width] x [0, height]; sides "left" and "right" (x), "bottom" and "top" (y).
+        """Return [0, a] x [0, b]; sides "left" and "right" (x), "bottom" and "top" (y).
 
         Parameters
         ----------
-        width : float
-            Length along x [mm].
-        height : float
-            Length along y [mm].
+        *size : float
+            Lengths a and b [mm], as two numbers or as one sequence.
         cells : tuple of int
             Number of cells along x and y.
         order : int
@@ -218,13 +214,12 @@ class Mesh:
         """
         from softehl.runtime.mesh.structured import grid
 
-        return grid((width, height), cells, order, shape, spread=spread)
+        return grid(_lengths("rectangle", size, 2), cells, order, shape, spread=spread)
 
     @classmethod
     def box(
         cls,
-        size: Sequence[float],
-        *,
+        *size: float | Sequence[float],
         cells: tuple[int, int, int],
         order: int = 1,
         shape: Shape = "hex",
@@ -236,8 +231,8 @@ class Mesh:
 
         Parameters
         ----------
-        size : sequence of float
-            Lengths a, b, c [mm].
+        *size : float
+            Lengths a, b and c [mm], as three numbers or as one sequence.
         cells : tuple of int
             Number of cells along x, y and z.
         order : int
@@ -262,7 +257,43 @@ class Mesh:
         """
         from softehl.runtime.mesh.structured import grid
 
-        return grid(tuple(size), cells, order, shape, spread=spread)
+        return grid(_lengths("box", size, 3), cells, order, shape, spread=spread)
+
+    @classmethod
+    def frame(
+        cls,
+        points: Sequence[Sequence[float]],
+        members: Sequence[tuple[int, int]] | Mapping[str, Sequence[tuple[int, int]]] | None = None,
+        *,
+        cells: int = 1,
+        order: int = 1,
+    ) -> Mesh:
+        """Return straight members between points in the plane or in space, for bars and beams.
+
+        Parameters
+        ----------
+        points : sequence of points
+            Ends of the members [mm]; a polyline if no members are given.
+        members : sequence of pairs, or mapping of str to such, optional
+            Numbers of the two points of every member, or group -> pairs.
+        cells : int
+            Number of cells of every member.
+        order : int
+            Order of the cells, 1 to 6.
+
+        Returns
+        -------
+        Mesh
+            Cells line2, line3, up to line7. The points are its first nodes.
+
+        Raises
+        ------
+        MeshError
+            A number or point is not allowed, a member has no length, or a point has no member.
+        """
+        from softehl.runtime.mesh.structured import frame
+
+        return frame(points, members, cells, order)
 
     @classmethod
     def union(cls, **parts: Mesh) -> Mesh:
@@ -838,6 +869,20 @@ class Mesh:
         if not present:
             raise MeshError(f"side {name!r}: no face of the boundary has all its nodes there")
         return present
+
+
+def _lengths(name: str, size: Sequence[Any], dimension: int) -> tuple[float, ...]:
+    """Lengths of a rectangle or box that are given as numbers or as one sequence."""
+    lengths = size[0] if len(size) == 1 else size
+    try:
+        found = tuple(map(float, lengths))
+    except (TypeError, ValueError):
+        found = ()
+    if len(found) != dimension:
+        text = ", ".join(map(repr, size))
+        example = ", ".join(("10", "1", "1")[:dimension])
+        raise MeshError(f"{name}({text}): {dimension} lengths are needed, as in {name}({example})")
+    return found
 
 
 def _frozen(name: str, array: Any) -> NDArray[Any]:

@@ -43,6 +43,13 @@ def import_pyvista() -> Any:
     return pyvista
 
 
+def new_plotter(*, off_screen: bool) -> Any:
+    """A plotter of PyVista; VTK would warn where there is no display."""
+    pyvista = import_pyvista()
+    with pyvista.vtk_verbosity("error"):
+        return pyvista.Plotter(off_screen=off_screen)
+
+
 @dataclass(frozen=True, eq=False)
 class Picture:
     """Nodes (n, dim), cells by kind, values at nodes or in cells, and how they are drawn.
@@ -64,7 +71,7 @@ class Picture:
         """Draw into a plotter of PyVista, a new one if none is given; returns it."""
         pyvista = import_pyvista()
         if plotter is None:
-            plotter = pyvista.Plotter(off_screen=off_screen)
+            plotter = new_plotter(off_screen=off_screen)
         grid = self._grid(pyvista)
         bent = any(CELLS[kind].order > 1 and CELLS[kind].exponents for kind in self.cells)
         surface = grid.extract_surface(

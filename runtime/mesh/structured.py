@@ -1,11 +1,12 @@
-"""Structured meshes of lines, rectangles and boxes, of every kind of cell, with named sides."""
+"""Structured meshes: lines, rectangles, boxes of every kind of cell, and frames of members."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations, product
 from math import prod
+from typing import TypeAlias
 
 import numpy as np
 
@@ -31,6 +32,51 @@ KINDS = {
 SIDES = {1: ("left", "right"), 2: ("left", "right", "bottom", "top")}
 SIDES[3] = ("left", "right", "front", "back", "bottom", "top")
 """Names of the sides at the smallest and largest x, y and z."""
+
+
+Pairs: TypeAlias = Sequence[tuple[int, int]]
+
+
+def frame(
+    points: Sequence[Sequence[float]],
+    members: Pairs | Mapping[str, Pairs] | None,
+    cells: int,
+    order: int,
+) -> Mesh:
+    """Straight members between points.  Raises MeshError."""
+    ends = np.array(points, dtype=np.float64)
+    if ends.ndim != 2 or ends.shape[1] not in (2, 3) or not np.isfinite(ends).all():
+        raise MeshError("points: (x, y) or (x, y, z) of two points or more are needed")
+    if members is None:
+        members = [(i, i + 1) for i in range(len(ends) - 1)]
+    groups = members if isinstance(members, Mapping) else {"": members}
+    pairs = [(int(i), int(j)) for group in groups.values() for i, j in group]
+    count = count_of(cells)
+    if not count:
+        raise MeshError(f"cells = {cells}: a whole number of at least 1 is needed")
+    kind = _kind(1, order, "quad")
+    rows, nodes, total = [], [ends], len(ends)
+    along = _axis(1.0, count, order)[1:-1, None]
+    numbers = _numbers(kind, [count], order)
+    for i, j in pairs:
+        if not (0 <= i < len(ends) and 0 <= j < len(ends)):
+            raise MeshError(f"member ({i}, {j}): the points are numbered 0 to {len(ends) - 1}")
+        if np.allclose(ends[i], ends[j], rtol=1e-12, atol=0.0):
+            raise MeshError(f"member ({i}, {j}): its points are at one place")
+        nodes.append(ends[i] + along * (ends[j] - ends[i]))
+        own = np.concatenate([[i], np.arange(total, total + len(along)), [j]])
+        rows.append(own[numbers])
+        total += len(along)
+    lonely = sorted(set(range(len(ends))) - {n for pair in pairs for n in pair})
+    if lonely:
+        raise MeshError(f"point {lonely[0]} has no member")
+    starts = count * np.cumsum([0, *map(len, groups.values())])
+    named = {
+        name: {kind: np.arange(first, last)}
+        for name, first, last in zip(groups, starts[:-1], starts[1:], strict=True)
+        if name
+    }
+    return Mesh(np.concatenate(nodes), {kind: np.concatenate(rows)}, groups=named)
 
 
 def grid(

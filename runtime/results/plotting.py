@@ -12,7 +12,13 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.plotting import Picture, import_pyvista, picture_file, show_or_save
+from softehl.runtime.mesh.plotting import (
+    Picture,
+    import_pyvista,
+    new_plotter,
+    picture_file,
+    show_or_save,
+)
 from softehl.runtime.results.explanation import block_called
 from softehl.runtime.results.tensors import von_mises
 from softehl.runtime.suggestions import did_you_mean, join_names
@@ -155,7 +161,6 @@ def animate(
     path = Path(file)
     if path.suffix not in MOVIES:
         raise StudyError(f"file = {str(file)!r}: animations end in {' or '.join(MOVIES)}")
-    pyvista = import_pyvista()
     options: dict[str, Any] = {"block": block, "deformed": deformed, "recovery": recovery}
     pictures = [picture_of(r, name, edges=edges, **options) for r in results]
     if not pictures:
@@ -168,7 +173,7 @@ def animate(
         np.pad(b, (0, 3 - len(b))) for b in (bounds.min(axis=(0, 1)), bounds.max(axis=(0, 1)))
     )
     path.parent.mkdir(parents=True, exist_ok=True)
-    plotter = pyvista.Plotter(off_screen=True)
+    plotter = new_plotter(off_screen=True)
     if path.suffix == ".gif":
         plotter.open_gif(str(path), fps=rate, loop=0)
     else:
@@ -203,6 +208,6 @@ def plot_path(
         dof = system.numbering.nodal[name][node]
         there = [limit.x[dof] for limit in limits], [limit.t for limit in limits]
         chart.scatter(*there, color="r", size=8, label="limit points")
-    plotter = pyvista.Plotter(off_screen=file is not None)
+    plotter = new_plotter(off_screen=file is not None)
     plotter.add_chart(chart)
     show_or_save(plotter, file)

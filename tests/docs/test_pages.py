@@ -44,6 +44,7 @@ PARTS = {
     **{f"gallery/{entry}": ("gallery/", text_of(f"gallery/{entry}")) for entry in ENTRIES},
     "compare": ("models/compare", text_of("compare")),
     "derivatives": ("models/derivatives", text_of("derivatives")),
+    "library": ("", text_of("library")),
     "report": ("", text_of("report")),
 }
 """Name -> folder of the models that it shows ("" for docs/models), and the text that runs."""

@@ -90,6 +90,30 @@ def test_structured_meshes_and_their_sides(shape: str, order: int) -> None:
         assert total == pytest.approx(length, rel=1e-12)
 
 
+def test_lengths_are_numbers_or_one_sequence() -> None:
+    for one, other in (
+        (Mesh.box(3, 2, 1, cells=(1, 1, 1)), Mesh.box((3, 2, 1), cells=(1, 1, 1))),
+        (Mesh.rectangle(3, 2, cells=(1, 1)), Mesh.rectangle([3, 2], cells=(1, 1))),
+    ):
+        assert np.array_equal(one.points, other.points)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_members_of_a_frame(order: int) -> None:
+    corners = [(0.0, 0.0), (0.0, 3.0), (4.0, 3.0), (4.0, 0.0)]
+    members: dict[str, list[tuple[int, int]]] = {"columns": [(0, 1), (2, 3)], "beam": [(1, 2)]}
+    mesh = Mesh.frame(corners, members, cells=2, order=order)
+    (kind,) = mesh.cells
+    assert np.array_equal(mesh.points[:4], corners)
+    assert len(mesh.points) == 4 + 3 * (2 * order - 1)
+    weights = CELLS[kind].rule(order)
+    lengths = measures(CELLS[kind], mesh.points[mesh.cells[kind]], weights[0]) @ weights[1]
+    of = {name: lengths[rows[kind]].sum() for name, rows in mesh.groups.items()}
+    assert of == pytest.approx({"columns": 6.0, "beam": 4.0})
+    polyline = Mesh.frame(corners, cells=2, order=order)
+    assert len(polyline.cells[kind]) == 6
+
+
 def test_a_face_that_looks_inwards_is_seen() -> None:
     mesh = made("hex", 1)
     kind, faces = next(iter(mesh.boundary.items()))
@@ -147,6 +171,12 @@ def test_what_is_refused(tmp_path: Path) -> None:
         Mesh(mesh.points, mesh.cells, {"g": {"quad4": np.array([6])}}).check()
     with pytest.raises(MeshError, match=r"points are complex128 of shape \(12, 2\)"):
         mesh.map(lambda x: x + 1j)  # type: ignore[arg-type, return-value]
+    with pytest.raises(MeshError, match=r"box\(1, 1\): 3 lengths are needed"):
+        Mesh.box(1, 1, cells=(1, 1, 1))
+    with pytest.raises(MeshError, match=r"member \(0, 2\): the points are numbered 0 to 1"):
+        Mesh.frame([(0, 0), (1, 0)], [(0, 2)])
+    with pytest.raises(MeshError, match="point 2 has no member"):
+        Mesh.frame([(0, 0), (1, 0), (2, 0)], [(0, 1)])
     (tmp_path / "bad.msh").write_text("nothing of a mesh\n")
     with pytest.raises(MeshError, match=r"bad\.msh"):
         Mesh.read(tmp_path / "bad.msh")
