@@ -25,7 +25,7 @@ from softehl.cases.harness.case_file import read_assignment, validated
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.report.part import FinishedRun
 from softehl.cases.harness.resume import advice_of
-from softehl.cases.seal.gland.catalogue import as568
+from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.trade.normalise_text import NotUnderstoodError, number_text
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.rubber_names import RANGES
@@ -63,7 +63,7 @@ _RINGS = (
     *(f"ISO 3601 {size}" for size in _SIZES),
     *("X-ring 36x4", "X-ring AS568-210", "X-ring AS568-226"),
     *("U-cup 20x30x8", "U-cup 25x35x8", "U-cup 36x46x8", "U-cup 50x65x12"),
-    *(ring.name for ring in as568().values() if _SMALL < ring.inner_diameter < _LARGE),
+    *(ring.name for ring in catalogue.as568().values() if _SMALL < ring.inner_diameter < _LARGE),
 )
 _HARDNESSES = {"FKM": (75, 80, 90), "EPDM": (70, 80), "PU": (90, 95)}
 _RUBBERS = tuple(f"{p} {s}" for p in RANGES for s in _HARDNESSES.get(p, (70, 80, 90)))
@@ -115,15 +115,19 @@ def rods(ring: str) -> list[str]:
         ring_name = read_ring(ring)
     except NotUnderstoodError:
         return []
-    if ring_name.number is None:
-        sizes: tuple[float, float] = (ring_name.inner, ceil(1.02 * ring_name.inner))
-        bore = ring_name.outer or ring_name.inner + 2.0 * ring_name.section
-    elif ring_name.number in as568():
-        inner = as568()[ring_name.number].inner_diameter
-        sizes = (ceil(inner), round(1.02 * inner, 1))
-        bore = round(as568()[ring_name.number].outer_diameter, 1)
+    if ring_name.outer is not None:
+        inner, bore = ring_name.inner, ring_name.outer
+        sizes: tuple[float, float] = (inner, ceil(1.02 * inner))
     else:
-        return []
+        try:
+            found_ring = catalogue.ring(ring)
+        except NotUnderstoodError:
+            return []
+        inner, bore = found_ring.inner_diameter, round(found_ring.outer_diameter, 1)
+        of_any_size = not (ring_name.number or ring_name.code or ring_name.inch)
+        sizes = (
+            (inner, ceil(1.02 * inner)) if of_any_size else (ceil(inner), round(1.02 * inner, 1))
+        )
     texts = dict.fromkeys(map(number_text, sizes))
     found = [f"{size}{fit}" for size in texts for fit in _FITS]
     return [*found, *(f"{BORE}{number_text(bore)}{fit}" for fit in _HOLES)]

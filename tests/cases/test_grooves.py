@@ -11,7 +11,7 @@ import pytest
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland import catalogue
-from softehl.cases.seal.gland.catalogue import as568, ring
+from softehl.cases.seal.gland.catalogue import as568, ring, series
 from softehl.cases.seal.gland.grooves import (
     INCH,
     KINDS,
@@ -197,9 +197,101 @@ def test_rings_by_name() -> None:
     assert (metric.inner_tolerance, metric.section_tolerance) == (0.48, 0.10)
 
 
+# sizes of makers' catalogues: inside diameter, section, mm
+OF_SERIES = {
+    **{"P3": (2.8, 1.9), "P10": (9.8, 1.9), "P10A": (9.8, 2.4), "P11.2": (11.0, 2.4)},
+    **{"P22": (21.8, 2.4), "P22A": (21.7, 3.5), "P22.4": (22.1, 3.5), "P50": (49.7, 3.5)},
+    **{"P48A": (47.6, 5.7), "P150": (149.6, 5.7), "P150A": (149.5, 8.4), "P400": (399.5, 8.4)},
+    **{"G25": (24.4, 3.1), "G145": (144.4, 3.1), "G150": (149.3, 5.7), "G300": (299.3, 5.7)},
+    **{"V15": (14.5, 4.0), "V175": (173.0, 4.0), "V480": (475.0, 10.0), "V1055": (1044.0, 10.0)},
+    **{"S22": (21.5, 1.5), "S22.4": (21.9, 2.0), "R8": (8.9, 2.7), "R27": (37.3, 3.6)},
+}
+
+
+def test_rings_of_series() -> None:
+    for code, sizes in OF_SERIES.items():
+        for name in (code, f"O-ring {code[0]}-{code[1:]}"):
+            found = ring(name)
+            assert (found.inner_diameter, found.section_diameter) == sizes, name
+    assert ring("JIS B 2401-1 P20").name == "JIS B 2401 P20"
+    assert (ring("R28"), ring("R52")) == (as568()[325], as568()[349])
+    for letter in "PGVSR":
+        rings = [r for code, r in series().items() if code[0] == letter]
+        by_section = [(r.section_diameter, r.inner_diameter) for r in rings]
+        assert by_section == sorted(set(by_section)), letter
+
+
+def test_a_ring_of_jis_has_the_groove_of_its_standard() -> None:
+    """JIS B 2401-2: P20 sits between 20 and 24 mm in a groove of 3.2 mm."""
+    p = made(ring="P20", rod=20.0)
+    assert (p.housing_diameter, p.groove_width) == (24.0, 3.2)
+    assert "its standard gland (housing_diameter = 24 mm" in assumed(ring="P20", rod=20.0)
+    assert made(ring="P20", bore=24.0).housing_diameter == -20.0
+    pneumatic = made(ring="P20", rod=20.0, gland="pneumatic")
+    assert pneumatic.depth == pytest.approx(gland(2.4, "pneumatic").depth)
+    assert "without motion" not in " ".join(CASE.warnings(p))
+    assert "are for seals without motion" in " ".join(CASE.warnings(made(ring="G50", rod=50.0)))
+
+
+def test_sizes_of_iso_3601_have_a_class() -> None:
+    a, b = ring("ISO 3601-1-210A-N"), ring("ISO 3601-1 210B 18,64x3,53 - S")
+    assert a == as568()[210]
+    assert (b.inner_diameter, b.section_diameter) == (a.inner_diameter, a.section_diameter)
+    assert (b.inner_tolerance, b.section_tolerance) == (0.25, 0.10)
+
+
+def test_rings_by_inches() -> None:
+    for name, number in {
+        "1 1/2 in x 1/8 in": 222,
+        '3/4" x 1" x 1/8"': 210,
+        "1-1/2 x 3/16 in": 325,
+        ".734 in x .139 in": 210,
+        "26 in x 1/4 in": 475,
+        "1/4 inch x 1/16 inch": 10,
+    }.items():
+        assert ring(name) == as568()[number], name
+    other = ring("0.8 in x 0.11 in")
+    assert (other.inner_diameter, other.section_diameter) == (20.32, 2.794)
+
+
+RUBBERS = {
+    **{"MS28775-210": "NBR 70", "M83248/1-210": "FKM 75", "NAS1611-210": "EPDM 80"},
+    **{"Parker 2-210 N0674-70": "NBR 70", "2-210 N674-70": "NBR 70", "210 NBR 90": "NBR 90"},
+}
+
+
+def test_rings_with_their_rubber() -> None:
+    for name, rubber in RUBBERS.items():
+        p = made(ring=name, rod=19.0)
+        assert p.section_diameter == pytest.approx(3.5306)
+        assert p.compound == rubber
+        assert Seal(**p.model_dump()) == p
+    assert made(ring="JIS B 2401 P20 1A", rod=20.0).compound == "NBR 70"
+    said = assumed(ring="MS28775-210", rod=19.0)
+    assert "a rubber NBR 70, as MS28775 asks for" in said
+    assert made(ring="MS28775-210", rod=19.0, mu=2.0, material="neo-hooke").shear_modulus == 2.0
+    with pytest.raises(ValueError, match='is of NBR 70, and compound = "FKM 75"'):
+        made(ring="MS28775-210", rod=19.0, material="FKM 75")
+
+
+def test_small_and_large_sections_have_a_gland_by_rule() -> None:
+    small = gland(as568()[1].section_diameter)
+    assert small.by_rule
+    assert squeeze(1.016, small.depth) == pytest.approx(squeeze(1.5, 1.25), abs=0.5)
+    assert gland(8.4).width == 11.0
+    assert "in proportions" in assumed(ring="AS568-001", rod=0.75)
+    with pytest.raises(ValueError, match="only 1 to 10 mm"):
+        gland(12.0)
+
+
 @pytest.mark.parametrize(
     ("name", "says"),
     [
+        ("P33", 'no size of JIS B 2401 that is known here; write "P32" or "P34"'),
+        ("R7", 'write "R8" or "R9"'),
+        ("ISO 3601-1 210A 19x3.53", 'size 210 is 18.64x3.53, not 19x3.53; write "AS568-210"'),
+        ("7/10 in x 1/8 in", 'the nearest is; write "AS568-209"'),
+        ("1 in x 1/7 in", "nominal sections of AS568 are 1/16, 3/32, 1/8, 3/16, 1/4 in"),
         ("AS568-100", 'no general size -100; nearest: "AS568-050" and "AS568-102"'),
         ("-999", 'nearest: "AS568-475"'),
         ("000", 'nearest: "AS568-001"'),

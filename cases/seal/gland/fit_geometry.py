@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from softehl.cases.seal.gland import catalogue
-from softehl.cases.seal.gland.grooves import KINDS, Groove, cup_gland, gland
+from softehl.cases.seal.gland.catalogue import ring_gland
+from softehl.cases.seal.gland.grooves import KINDS, Groove, cup_gland
 from softehl.cases.seal.gland.key_values import agree, number, put, value_text
 from softehl.cases.seal.gland.records import OF_PISTON, FreeSeal, Gland
+from softehl.cases.seal.gland.rubbers.materials import KEYS
 from softehl.cases.seal.gland.sections.section_keys import section_of_file
 from softehl.cases.seal.gland.sections.shapes import UCup, parts_of
 from softehl.cases.seal.gland.trade.parse_terms import bands, texts
@@ -116,6 +118,8 @@ def _with_ring(values: dict[str, Any]) -> None:
         _with_cup(values, rod, ground, ring_name.width or 0.0)
         return
     ring = catalogue.ring(values["ring"])
+    if ring_name.rubber:
+        _with_rubber_of_ring(values, ring_name.rubber)
     if values.get("rod_diameter") is None:
         rod, bore = round(1.02 * ring.inner_diameter, 1), round(ring.outer_diameter, 1)
         raise ValueError(
@@ -128,6 +132,17 @@ def _with_ring(values: dict[str, Any]) -> None:
     _follow(values, "inner_diameter", inner, "ring")
     _follow(values, "section_diameter", ring.section_diameter, "ring")
     _with_usual_gland(values)
+
+
+def _with_rubber_of_ring(values: dict[str, Any], rubber: str) -> None:
+    """The rubber of a ring that is named with it, unless its modulus is given.  ValueError."""
+    if any(values.get(key) is not None for key in ("fit", "shore_A", *KEYS)):
+        return
+    named = values.setdefault("compound", rubber)
+    if named != rubber:
+        raise ValueError(
+            f'ring = "{values["ring"]}" is of {rubber}, and compound = "{named}": leave one out'
+        )
 
 
 def _with_usual_gland(values: dict[str, Any]) -> None:
@@ -201,7 +216,8 @@ def _with_gland(values: dict[str, Any]) -> None:
 def _groove(values: Mapping[str, Any], section: float) -> Groove:
     """The standard gland of a section."""
     if values.get("section") != "u_cup":
-        return gland(section, values["gland"], values.get("section", "round"))
+        name = values["ring"] if isinstance(values.get("ring"), str) else None
+        return ring_gland(name, section, values["gland"], values.get("section", "round"))
     parts = parts_of(UCup)
     heel = values.get("heel_height") or parts["heel_height"] * section
     return cup_gland(section, heel, values.get("section_width") or parts["width"] * section)

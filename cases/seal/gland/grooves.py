@@ -8,10 +8,12 @@
   widths there have +0.25 mm.
 - "pneumatic": a maker's chart for pneumatic, dynamic use (rhondamaseals.co.uk, groove sizes), with
   about half the squeeze.
+- 8.4 mm, "dynamic": the groove of JIS B 2401-2.
 - X-rings: the chart of Minnesota Rubber's Quad-Rings for non-rotary dynamic use.
 
 Depths of a rod and of a piston are the same. Between two sections of a chart squeeze and width over
-section are interpolated. A U-cup has no chart: the ground of its groove is half way between heel
+section are interpolated; below the first and above the last they are those of the nearest, for
+sections of 1 to 10 mm. A U-cup has no chart: the ground of its groove is half way between heel
 and lips, and the groove is a tenth wider than the seal.
 """
 
@@ -60,10 +62,13 @@ def gland(section_diameter: float, kind: Kind = "dynamic", section: str = "round
         if below.section_diameter < section_diameter < above.section_diameter:
             return _between(below, above, section_diameter)
     scale = section_diameter / nearest.section_diameter
+    if 1.0 <= section_diameter <= 10.0:
+        depth, width = round(scale * nearest.depth, 2), round(scale * nearest.width, 2)
+        return Groove(section_diameter, depth, width, by_rule=True)
     raise ValueError(
         f'gland = "{kind}" has no groove for a section of {section_diameter:g} mm (only '
-        f"{chart[0].section_diameter:.3g} to {chart[-1].section_diameter:.3g} mm); give squeeze "
-        "and groove_width instead: in the proportions of the nearest one, squeeze = "
+        "1 to 10 mm); give squeeze and "
+        "groove_width instead: in the proportions of the nearest one, squeeze = "
         f"{squeeze(nearest.section_diameter, nearest.depth):.3g} and groove_width = "
         f"{scale * nearest.width:.3g}"
     )

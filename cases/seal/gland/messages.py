@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any
 
-from softehl.cases.seal.gland.grooves import gland
+from softehl.cases.seal.gland.catalogue import ring_gland
 from softehl.cases.seal.gland.key_values import value_text
 from softehl.cases.seal.gland.oils import DENSITY
 from softehl.cases.seal.gland.parameters import Seal
@@ -106,6 +106,7 @@ def _unusual(p: Seal) -> Iterator[str]:
             f"a speed of {max(p.speeds):g} mm/s: reciprocating seals are used to {FASTEST:g} mm/s, "
             "and the heat of the film is left out"
         )
+    yield from _of_series(p)
     yield from _cold(p)
     used = RANGES[p.polymer] if p.polymer else None
     if used and p.temperature is not None and not used[0] <= p.temperature <= used[1]:
@@ -113,6 +114,22 @@ def _unusual(p: Seal) -> Iterator[str]:
             f"temperature = {p.temperature:g} degC: {p.polymer} is used from {used[0]:g} to "
             f"{used[1]:g} degC"
         )
+
+
+_STATIC = {
+    "G": "rings of the G series are for seals without motion; those for motion are of the P series",
+    "V": "rings of the V series are for flanges of vacuum, and have no groove in a cylinder",
+    "S": "rings of the slim series are for seals without motion, and the groove is not that of "
+    "their maker",
+}
+"""Series of rings -> what their catalogue says of seals that move."""
+
+
+def _of_series(p: Gland) -> Iterator[str]:
+    """A series of rings that is not made for motion."""
+    code = read_ring(p.ring).code if p.ring else None
+    if code and (message := _STATIC.get(code[0])):
+        yield f"ring = {p.ring}: {message}"
 
 
 def _cold(p: Seal) -> Iterator[str]:
@@ -163,6 +180,10 @@ def assumed(p: Seal, set_keys: Collection[str]) -> list[str]:
     return [*_ring(p, keys_set), *_gland(p, keys_set), *_fluids(p, keys_set)]
 
 
+_RUBBER = frozenset(("material", "compound", "shore_A", "fit", *materials.KEYS))
+"""Keys that a rubber is given by."""
+
+
 def _ring(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
     """Ring and rubber."""
     if not keys_set & {"ring", "section_diameter", "outline"}:
@@ -171,6 +192,9 @@ def _ring(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
         yield f"the usual proportions of section {p.section}"
     if not keys_set & {"ring", "inner_diameter"}:
         yield f"inner diameter {p.ring_diameter:g} mm"
+    ring_name = read_ring(p.ring) if p.ring else None
+    if ring_name and ring_name.standard and not keys_set & _RUBBER:
+        yield f"a rubber {ring_name.rubber}, as {ring_name.standard} asks for"
     if p.shore_A is not None:
         low, high = shore_band(p.shore_A, p.polymer)
         yield (
@@ -214,7 +238,7 @@ def _kind(p: Gland) -> tuple[str, bool]:
         return "the gland of a U-cup by rule, its ground half way between heel and lips", False
     if p.section not in (ROUND, "x_ring") or p.outline:
         return f"the gland of an O-ring, as none is known for this {p.named}", False
-    if gland(p.section_diameter, p.gland, p.section).by_rule:
+    if ring_gland(p.ring, p.section_diameter, p.gland, p.section).by_rule:
         return "a gland in proportions between those of the neighbouring sections", False
     return "its standard gland", True
 

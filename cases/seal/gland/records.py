@@ -195,8 +195,8 @@ class FreeSeal(SectionKeys):
     ring: str | None = key(
         None,
         "a ring by its name, for inner_diameter and section_diameter",
-        bounds='"AS568-226", "36x4", "ISO 3601 50.4x3.55", "X-ring 36x4", "U-cup 25x35x8", left '
-        "out = by its diameters (docs/trade.md)",
+        bounds='"AS568-226", "36x4", "ISO 3601-1 226A", "P50", "X-ring 36x4", "U-cup 25x35x8", '
+        "left out = by its diameters (docs/trade.md)",
     )
     inner_diameter: float = key(
         50.39,

@@ -1,12 +1,14 @@
-"""Names of rings: "36x4", "ISO 3601 36x4", "AS568-210", "X-ring 36x4", "U-cup 25x35x8"."""
+"""Names of rings: "36x4", "ISO 3601-1 210A", "AS568-210", "P20", "U-cup 25x35x8"."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Literal, get_args
 
 from softehl.cases.seal.gland.trade.normalise_text import NUMBER, form, plain, refused
+from softehl.cases.seal.gland.trade.rubber_names import read_rubber
 
 Kind = Literal["round", "x_ring", "u_cup"]
 
@@ -15,14 +17,21 @@ Kind = Literal["round", "x_ring", "u_cup"]
 class RingName:
     """A ring as its name says, mm.  kind: of the section, None where the name does not say it.
 
-    number: of SAE AS568; else inner and section; a U-cup is named by its groove instead: rod
-    (inner), groove diameter (outer) and groove width. bore_first: named as a piston seal is, by its
-    bore (outer), groove diameter (inner) and width.
+    number: of SAE AS568, iso_class: A or B, its class in ISO 3601-1; code: letter and size of a
+    series ("P22A"); else inner and section, in mm, or in inches: inch is "nominal" or "true" then.
+    A U-cup is named by its groove instead: rod (inner), groove diameter (outer) and groove width.
+    bore_first: named as a piston seal is, by its bore (outer), groove diameter (inner) and width.
+    rubber: polymer and hardness, where the name has it; standard: what that follows from.
     """
 
     number: int | None = None
     inner: float = 0.0
     section: float = 0.0
+    code: str | None = None
+    iso_class: str | None = None
+    inch: Literal["nominal", "true"] | None = None
+    rubber: str | None = None
+    standard: str | None = None
     kind: Kind | None = None
     outer: float | None = None
     width: float | None = None
@@ -30,7 +39,7 @@ class RingName:
 
 
 _SECTIONS = {
-    "round": r"O[- ]?rings?|ORs?|O[- ]?seals?|RORs?|toroidal seals?|circular",
+    "round": r"O[- ]?rings?|O ?形(?:密封)?圈|ORs?|O[- ]?seals?|RORs?|toroidal seals?|circular",
     "x_ring": r"X[- ]?rings?|XRs?|quad(?:[- ]?(?:rings?|seals?))?|4[- ]?lobe(?:d)?(?: rings?)?"
     r"|Q-?(?=4-?\d\d\d)",
     "u_cup": r"U[- ]?cups?|U[- ]?rings?|U[- ]?seals?|lip seals?|Nutring",
@@ -42,7 +51,8 @@ _SECTIONS = {
 
 _STANDARD = form(
     r"\b(?:(?:DIN|EN|BS|GOST R)[ -]?)*ISO[ -]?3601(?:-[1-5][AB]?(?!\d))?(?:[:-](?:19|20)\d\d)?"
-    r"|\bDIN[ -]?377[01](?:-[1-5](?!\d))?|\bGB/?T[ -]?3452(?:\.1)?"
+    r"|\bDIN[ -]?377[01](?:-[1-5](?!\d))?|\bGB/?T[ -]?3452(?:\.1)?(?:-(?:19|20)\d\d)?"
+    r"|\bBS[ -]?4518(?::(?:19|20)\d\d)?|\bJIS ?B ?2401(?:-[1-4](?!\d))?(?::(?:19|20)\d\d)?"
 )
 _DASH = form(
     r"(?P<said>(?:SAE )?AS[ -]?568[A-G]?(?: dash| no\.?)?|ARP ?568|#|BS(?: ?1806)?|Parker"
@@ -50,12 +60,49 @@ _DASH = form(
     r"[ -]*?(?P<dash>2-|-)?(?P<number>\d{1,3})[AB]?"
 )
 _QUAD = re.compile(r"4-?(?P<number>\d{3})")
+_ISO = form(
+    rf"(?P<number>\d{{3}})(?P<iso_class>[AB])?(?:[ -]+(?P<inner>{NUMBER})x(?P<section>{NUMBER}))?"
+    r"(?:[ -]+(?:N|S|CS))?"
+)
+"""Size code of ISO 3601-1, class, sizes, grade of ISO 3601-3."""
 _MILITARY = form(
     r"(?P<name>MS ?-?(?:28775|29513)|M ?-?(?:25988|83248|83461|83485)(?:/\d)?"
     r"|NAS ?-?(?:1593|1594|1611))"
     r"[ -]+(?P<number>\d{3})"
 )
 """Standards of rubbers whose rings have the dash numbers of AS568."""
+_MILITARY_RUBBERS = {
+    "MS28775": "NBR 70",
+    "M25988/1": "FVMQ 70",
+    "M83248/1": "FKM 75",
+    "M83248/2": "FKM 90",
+    "M83461/1": "NBR 75",
+    "M83485/1": "FKM 75",
+    "NAS1593": "FKM 75",
+    "NAS1594": "FKM 90",
+    "NAS1611": "EPDM 80",
+}
+"""Standard of a ring -> the rubber that it asks for."""
+_PARKER = form(r"(?P<ring>.*\d)[ /,-]+(?P<compound>[NVESC]0?\d{3,4}-\d\d)")
+_PARKER_RUBBERS = {
+    "N674-70": "NBR 70",
+    "N552-90": "NBR 90",
+    "V747-75": "FKM 75",
+    "V709-90": "FKM 90",
+    "E540-80": "EPDM 80",
+    "S604-70": "VMQ 70",
+}
+"""Compound of Parker's O-ring handbook, without the 0 behind its letter -> rubber."""
+_SERIES = form(
+    r"(?:JIS ?)?(?P<letter>[PGVSR])[ -]?(?P<size>\d+(?:\.\d)?A?)(?:[ -]+(?P<type>[1-4][A-D]))?"
+)
+_JIS_RUBBERS = {"1A": "NBR 70", "1B": "NBR 90", "4C": "VMQ 70", "4D": "FKM 70"}
+"""Class of rubber of JIS B 2401 before 2012 -> rubber."""
+_BS_4518 = form(r"(?P<inner>\d{4})-(?P<section>16|24|30|41|57|84)")
+"""Size code of BS 4518: inside diameter and section in tenths of a millimetre."""
+_IN = r"""(?:in(?:ch(?:es)?)?\b\.?|"|'')"""
+_INCHES = rf"((?:\d+[ -])?\d+/\d+|\d*\.?\d+) ?{_IN}?"
+_INCH = form(rf"{_INCHES} ?x ?{_INCHES}(?: ?x ?{_INCHES})?")
 _COMPOUND = form(
     r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM)[ -]?\d\d\b.*)"
 )
@@ -64,7 +111,7 @@ _POLYMER = form(
 )
 _SIZE = form(
     rf"(?:\d{{3}}[AB][ -]+)?(?:ID|d1)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?x(?P<section>{NUMBER})"
-    rf" ?(?:mm)?(?:x(?P<third>{NUMBER}) ?(?:mm)?)?(?:[ -]+[NS])?"
+    rf" ?(?:mm)?(?:x(?P<third>{NUMBER}) ?(?:mm)?)?(?:[ -]+[GA])?(?:[ -]+(?:N|S|CS))?"
 )
 _WORDS = form(
     rf"(?:ID|d1|inside|inner)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?[ ,;/]+(?:CS|d2|section)[ =]*"
@@ -75,7 +122,25 @@ _WORDS = form(
 def read_ring(name: str) -> RingName:
     """The ring of a name.  Raises NotUnderstoodError."""
     text = plain(name)
+    if match := _COMPOUND.fullmatch(text):
+        rubber = read_rubber("ring", match["rubber"])
+        return replace(read_ring(match["ring"]), rubber=rubber.text if rubber else None)
+    if match := _PARKER.fullmatch(text):
+        return _with_standard(name, match["ring"], match["compound"], _PARKER_RUBBERS)
+    if match := _MILITARY.fullmatch(text):
+        standard = re.sub(r"[ -]", "", match["name"])
+        return _with_standard(name, f"AS568-{match['number']}", standard, _MILITARY_RUBBERS)
     remainder, kind = _without_kind(_STANDARD.sub(" ", text))
+    if found := _by_series(remainder) or _in_inches(remainder, kind):
+        return found
+    if (match := _ISO.fullmatch(remainder)) and not text.startswith("-") and remainder[3:]:
+        return RingName(
+            number=int(match["number"]),
+            inner=float(match["inner"] or 0.0),
+            section=float(match["section"] or 0.0),
+            kind=kind,
+            iso_class=match["iso_class"] and match["iso_class"].upper(),
+        )
     match = (
         None if text.startswith("-") else _SIZE.fullmatch(remainder) or _WORDS.fullmatch(remainder)
     )
@@ -103,6 +168,42 @@ def read_ring(name: str) -> RingName:
     raise _unknown(name, remainder, kind)
 
 
+def _with_standard(name: str, ring: str, standard: str, rubbers: dict[str, str]) -> RingName:
+    """A ring in the rubber of a standard, or of a maker.  Raises NotUnderstoodError."""
+    rubber = rubbers.get(re.sub(r"(?<=^[A-Z])0", "", standard.upper()))
+    if rubber is None:
+        why = f"is a ring in the rubber of {standard}, which is not known here; give its material"
+        raise refused("ring", name, why, ring)
+    return replace(read_ring(ring), rubber=rubber, standard=standard)
+
+
+def _by_series(text: str) -> RingName | None:
+    """A ring by letter and size, or by the size code of BS 4518."""
+    if match := _SERIES.fullmatch(text):
+        kind = (match["type"] or "").upper()
+        standard = f"JIS B 2401 {kind}" if kind in _JIS_RUBBERS else None
+        code = match["letter"].upper() + match["size"].upper()
+        return RingName(code=code, rubber=_JIS_RUBBERS.get(kind), standard=standard)
+    if match := _BS_4518.fullmatch(text):
+        return RingName(inner=0.1 * int(match["inner"]), section=0.1 * int(match["section"]))
+    return None
+
+
+def _in_inches(text: str, kind: Kind | None) -> RingName | None:
+    """A ring in inches, by inside and section, or inside, outside and section."""
+    match = _INCH.fullmatch(text)
+    if not match or kind == "u_cup" or not re.search(rf"/|{_IN}", text):
+        return None
+    texts = [part for part in match.groups() if part]
+    sizes = [float(sum(Fraction(part) for part in re.split(r"[ -]", text_))) for text_ in texts]
+    if len(sizes) == 3 and abs(sizes[1] - sizes[0] - 2.0 * sizes[2]) > 0.02:
+        return None
+    nominal = "/" in texts[-1]
+    return RingName(
+        inner=sizes[0], section=sizes[-1], kind=kind, inch="nominal" if nominal else "true"
+    )
+
+
 def read_section(word: str) -> str:
     """The section that a word of the trade means; any other text as it is."""
     text = plain(word)
@@ -126,10 +227,6 @@ def _without_kind(text: str) -> tuple[str, Kind | None]:
 
 def _unknown(name: str, remainder: str, kind: Kind | None) -> Exception:
     usual = ("36x4", "ISO 3601 50.4x3.55", "AS568-226")
-    if match := _COMPOUND.fullmatch(remainder):
-        ring = match["ring"].strip(" ,;-/")
-        why = f"has its rubber in it, which is another key: material = {match['rubber']!r}"
-        return refused("ring", name, why.replace("'", '"'), ring)
     if match := _POLYMER.fullmatch(remainder):
         why = "has its rubber in it, which is another key: material, polymer and hardness"
         return refused("ring", name, why, match["ring"].strip(" ,;-/"))
@@ -139,15 +236,6 @@ def _unknown(name: str, remainder: str, kind: Kind | None) -> Exception:
             why = f'has its section in it, which is another key: section = "{section}"'
             readable = _SIZE.fullmatch(size) or _DASH.fullmatch(size)
             return refused("ring", name, why, size if readable else usual[0])
-    if match := re.fullmatch(
-        r"(?:JIS ?(?:B ?2401)? ?)?([PGVS])-? ?(\d+)A?", remainder, re.IGNORECASE
-    ):
-        size = f"{match[1].upper()}{match[2]}"
-        why = f"is a size of JIS B 2401 ({size}), whose diameters are not in the catalogue"
-        return refused("ring", name, why, *usual[:2])
-    if match := _MILITARY.fullmatch(remainder):
-        why = f"is a size of AS568 in the rubber of {match['name']}; give its material too"
-        return refused("ring", name, why, f"AS568-{match['number']}")
     if re.match(r"AS[ -]?568", remainder, re.IGNORECASE):
         return refused("ring", name, "is no size of AS568, which have three digits", usual[2])
     sizes = re.findall(NUMBER, remainder)
