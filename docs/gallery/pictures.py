@@ -448,6 +448,20 @@ def swing(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=7)
 
 
+def impact(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2)
+    left.plot([0, 0, 1, 1, 1.5], [0, 1, 1, 0, 0], "k", lw=0.8, label="De Saint-Venant")
+    left.plot(space["times"], space["stresses"], color=ORANGE, label="60 cells a bar")
+    left.set(xlabel="t c / (2 L)", ylabel="stress / (rho c v / 2)", ylim=(-0.1, 1.35))
+    left.legend(loc="upper center", ncols=2, fontsize=7)
+    side = space["left"]
+    for part, label, colour in ((side, "first bar", BLUE), (~side, "second bar", GREEN)):
+        mean = [s.velocity("u_x")[part].mean() / space["v"] for s in space["states"]]
+        right.plot(space["times"], mean, color=colour, label=label)
+    right.set(xlabel="t c / (2 L)", ylabel="mean speed / v")
+    right.legend(loc="center right")
+
+
 def laminate(figure: Figure, space: dict[str, Any]) -> None:
     left, right = figure.subplots(1, 2, width_ratios=[1, 1.2])
     result = space["sheared"].result
@@ -550,6 +564,7 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "enhanced": enhanced,
     "jumps": jumps,
     "laminate": laminate,
+    "impact": impact,
 }
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from softehl.runtime.analyses.time_integrators import (
     step_before_end,
 )
 from softehl.runtime.arrays import Array
+from softehl.runtime.contact.penalty import with_penalty
 from softehl.runtime.definition.argument_checks import datum, require_names
 from softehl.runtime.definition.problem_definition import Datum, ProblemDefinition, StudyError
 from softehl.runtime.discretisation.problem import Problem
@@ -74,6 +75,9 @@ def march_with_inertia(
     """Return the motions of steps with inertia.  Raises StudyError, NotConverged."""
     prepared = options.prepare(definition)
     system, newton = prepared.system, prepared.newton
+    if isinstance(integrator, CentralDifference):
+        contacts = tuple(with_penalty(contact) for contact in system.contacts)  # type: ignore[arg-type]
+        system = replace(system, contacts=contacts)
     initial = initial_state(system, start)
     if until <= initial.t:
         raise StudyError(f"until = {until:g}: must be after the start, which is t = {initial.t:g}")

@@ -1,4 +1,7 @@
-"""Central differences with lumped masses: steps without equations to solve, short ones."""
+"""Central differences with lumped masses: steps without equations to solve, short ones.
+
+Contact acts by a penalty (`softehl.runtime.contact.penalty`), its pairs searched in every step.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from softehl.log import warn
 from softehl.runtime.analyses.equations_of_motion import EquationsOfMotion
 from softehl.runtime.analyses.motion import (
     EnergyBalance,
@@ -17,7 +21,9 @@ from softehl.runtime.analyses.motion import (
     stored_energy,
 )
 from softehl.runtime.analyses.time_integrators import ROUNDING, CentralDifference
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.contact.penalty import frequency_squared, lumped_areas
+from softehl.runtime.contact.search import ContactProblem
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.constraints import Constraints
 from softehl.runtime.discretisation.loads import Tie
@@ -30,13 +36,16 @@ SAFE = 0.9
 """Of the stable step, which is that of small motions about a state; strain stiffens."""
 _ACCURATE = 1e-3  # relative error of the highest frequency, far below what SAFE leaves
 _APART = 1e-9  # of the size of the mesh: a tie that opens by more does not hold
+_SAME = 1e-6  # of the largest pressure: pressures of a start that differ by less are its own
+_SHORTER = 2.0  # times: a penalty that shortens stable steps by more is reported
 
 
 @dataclass(eq=False)
 class ExplicitMarch:
     """Steps of at most SAFE times the stable one, which is looked at in each result.
 
-    dt: from result to result. free: what supports and ties leave, and masses there.
+    dt: from result to result. free: what supports and ties leave, and masses there. forces: at the
+    state. contact: its unknowns, if there are some.
     """
 
     dt: float
@@ -45,6 +54,9 @@ class ExplicitMarch:
     free: Constraints
     masses: Array
     integrator: CentralDifference
+    forces: Forces
+    contact: _ContactUnknowns | None
+    warned: bool = False
 
     @classmethod
     def of(
@@ -53,10 +65,15 @@ class ExplicitMarch:
         """From a state with velocities.  Raises StudyError where an unknown needs a mass."""
         problem = body.at_end(state.ended_step(dt), state.v)
         _require_lumped_masses(body, problem)
-        free = body.comm.constraints(problem)
-        march = cls(dt, body, state, free, free.gather(body.lumped_masses), integrator)
-        a = march._accelerations(Forces.of(problem, state.x, body.roles).total)
-        march.state = replace(state, a=a)
+        contact = _ContactUnknowns.of(body) if body.static_system.contacts else None
+        if contact is not None:
+            problem = replace(problem, old=state.x, latest=[])  # type: ignore[call-arg]
+            contact.require_own_pressures(problem, state.x)
+        free = body.comm.constraints(problem).without(body.roles.multipliers)
+        forces = _with_friction(Forces.of(problem, state.x, body.roles), problem, state.x, body)
+        masses = free.gather(body.lumped_masses)
+        march = cls(dt, body, state, free, masses, integrator, forces, contact)
+        march.state = replace(state, a=march._accelerations(forces.total + forces.contact))
         return march
 
     def run(self, until: float) -> Iterator[Motion]:
@@ -84,25 +101,27 @@ class ExplicitMarch:
         end = body.at_end(initial.step(t), half)
         x[end.fixed] = end.values
         half[end.fixed] = (x - initial.x)[end.fixed] / dt
-        forces = Forces.of(end, x, body.roles)
-        if self.body.comm.max(float(not np.isfinite(forces.total).all())):
+        if self.contact is None:
+            forces = Forces.of(end, x, body.roles)
+        else:
+            end, x, forces = self.contact.at_end(end, x)
+        if self.body.comm.max(float(not np.isfinite(forces.total + forces.contact).all())):
             where = body.comm.distribute(end).where_not_finite(x)
             place = where and f": {where}"
             message = f"t = {t:.6g}: the forces are not finite{place}"
             state = Solution(initial.x, Status.NOT_FINITE, message, (), 0, 0)
             raise NotConverged(Branch((Point(initial.t, state),), Status.NOT_FINITE, message))
-        a = self._accelerations(forces.total)
-        displacement = x - initial.x
-        old = Forces.of(initial_equations, initial.x, body.roles)
+        a = self._accelerations(forces.total + forces.contact)
+        displacement, old = x - initial.x, self.forces
         supports = np.zeros(len(x))
-        total = 0.5 * (old.total + forces.total)
+        total = 0.5 * (old.total + old.contact + forces.total + forces.contact)
         inertia = self.body.lumped_masses * (half - initial.v) / dt
         supports[end.fixed] = (total + inertia)[end.fixed]
         ledger.add(old.mean(forces), supports, displacement)
         ledger.external += parameter_work(initial_equations, end, body.roles, (initial.x, x), None)
         v = self.integrator.half_step(dt, half, a)
         histories = body.static_system.committed(end, x, initial.histories)
-        self.state = MotionState(t, x, v, a, histories)
+        self.state, self.forces = MotionState(t, x, v, a, histories), forces
         return end
 
     def _accelerations(self, forces: Array) -> Array:
@@ -110,7 +129,7 @@ class ExplicitMarch:
         return self.free.expand(-self.free.gather(forces) / self.masses)
 
     def _stable(self, problem: Problem) -> float:
-        """2 over the highest frequency about the present state."""
+        """2 over the highest frequency about the present state, and if all contacts were closed."""
         K = symmetric(problem.assembler.linearise(self.state.x, problem.parameters)[1])
         free, root, comm = self.free, 1.0 / np.sqrt(self.masses), self.body.comm
 
@@ -119,18 +138,35 @@ class ExplicitMarch:
             return root * free.gather(forces)
 
         begin = np.random.default_rng(comm.rank_and_size[0]).uniform(-1.0, 1.0, len(root))
-        frequency_squared = highest(scaled, begin, comm.dot, _ACCURATE)
-        return (
-            self.integrator.stable_step(frequency_squared)
-            if frequency_squared > 0.0
-            else self.dt / SAFE
+        bodies = highest(scaled, begin, comm.dot, _ACCURATE)
+        penalty = 0.0
+        if self.contact is not None:
+            penalty = self.contact.frequency_squared(problem)
+            self._warn_of_short_steps(bodies, penalty)
+        if bodies + penalty <= 0.0:
+            return self.dt / SAFE
+        return self.integrator.stable_step(bodies + penalty)
+
+    def _warn_of_short_steps(self, bodies: float, penalty: float) -> None:
+        """Warn once where the penalty of contacts, not the bodies, decides on the steps."""
+        if self.warned or not 0.0 < (_SHORTER**2 - 1.0) * bodies < penalty:
+            return
+        self.warned = True
+        alone, both = (self.integrator.stable_step(w) for w in (bodies, bodies + penalty))
+        warn(
+            f"contact: its stiffness shortens the stable step from {alone:.3g} to {both:.3g}, and "
+            'so stiff impacts gain or lose energy, see energy["balance"]: give a smaller '
+            "stiffness=..., which lets bodies overlap more",
+            StiffContact,
+            stacklevel=6,
         )
 
     def _energies(self, end: Problem, ledger: EnergyBalance) -> dict[str, float]:
         kinetic = 0.5 * float(self.body.lumped_masses @ self.state.v**2)
         stored = stored_energy(end, self.state.x, self.body.roles)
-        forces = Forces.of(end, self.state.x, self.body.roles)
-        return ledger.balance(self.state.t, kinetic, stored, forces, self.state.x)
+        if self.contact is not None:
+            stored += self.contact.stored_energy(self.forces, self.state.x)
+        return ledger.balance(self.state.t, kinetic, stored, self.forces, self.state.x)
 
     def _motion(self, end: Problem, ledger: EnergyBalance, steps: int, stable: float) -> Motion:
         state, size = self.state, float(np.ptp(self.body.static_system.mesh.points, axis=0).max())
@@ -144,7 +180,7 @@ class ExplicitMarch:
                         "ties of a constant offset, on no side of which a support moves"
                     )
         solution = Solution(state.x, Status.CONVERGED, f"{steps} steps", (), 0, 0)
-        distributed = self.body.comm.distribute(end)
+        distributed = self.body.comm.distribute(end.at(state.x))
         return Motion(
             self.body.static_system,
             distributed,
@@ -164,16 +200,11 @@ def _require_lumped_masses(body: EquationsOfMotion, problem: Problem) -> None:
     for block in problem.assembler.blocks:
         if isinstance(block.kernel, Tie):
             without[block.dofs[:, 2]] = False
+    without[body.roles.multipliers] = False
     layout = system.numbering.layout
-    touches = [] if system.definition is None else system.definition.contacts
     internal = {n for b in system.blocks.values() for n in getattr(b.kernel, "internal", ())}
     for name in layout.names:
         if comm.max(float(without[layout.part(name)].any())):
-            if any(name == request.unknown(m) for request in touches for m in ("lambda", "tau")):
-                raise StudyError(
-                    'method = "explicit" takes no contact: take "generalised-alpha", which damps '
-                    'what impacts leave, or "newmark" or "midpoint"'
-                )
             if name in internal:
                 raise StudyError(
                     f'method = "explicit": {name} belongs to elements (m.internal), whose '
@@ -183,3 +214,101 @@ def _require_lumped_masses(body: EquationsOfMotion, problem: Problem) -> None:
                 f'method = "explicit": {name} has no mass everywhere, and explicit steps are '
                 "force over mass; an implicit method can do without"
             )
+
+
+class StiffContact(RuntimeWarning):
+    """The penalty of a contact, not its bodies, decides how short explicit steps are."""
+
+
+def _with_friction(forces: Forces, problem: Problem, x: Array, body: EquationsOfMotion) -> Forces:
+    """Forces at unknowns x, (n,), with friction among those that only work."""
+    if not _rubs(body):
+        return forces
+    assert isinstance(problem, ContactProblem)
+    smooth = tuple(replace(c, friction=0.0) for c in problem.contacts)  # type: ignore[type-var]
+    normal = Forces.of(replace(problem, contacts=smooth, latest=[]), x, body.roles).contact
+    friction = forces.contact - normal
+    return replace(forces, others=forces.others + friction, contact=normal)
+
+
+def _rubs(body: EquationsOfMotion) -> bool:
+    """True if a contact has friction."""
+    return any(contact.friction for contact in body.static_system.contacts)
+
+
+@dataclass(frozen=True, eq=False)
+class _ContactUnknowns:
+    """Pressures and shear stresses at the nodes of contacts, which follow from the displacements.
+
+    pressures, all: their numbers. areas: (n,) of the nodes with them, over the penalty. places:
+    (n,) coordinates at rest of the unknowns that move the nodes.
+    """
+
+    body: EquationsOfMotion
+    pressures: Integers
+    all: Integers
+    areas: Array
+    places: Array
+
+    @classmethod
+    def of(cls, body: EquationsOfMotion) -> _ContactUnknowns:
+        system = body.static_system
+        assert system.definition is not None
+        requests = system.definition.contacts
+        labels = [label for request in requests for label in request.labels]
+        blocks = [system.assembler.block(label) for label in labels]
+        numbers = [c.multipliers[c.multipliers[:, 0] >= 0] for c in system.contacts]
+        pressures = np.concatenate([n[:, 0] for n in numbers])
+        all_of = np.concatenate([n.ravel() for n in numbers])
+        places = np.zeros(system.size)
+        for contact in system.contacts:
+            moves = contact.displacements >= 0
+            places[contact.displacements[moves]] = system.mesh.points[moves]
+        return cls(body, pressures, all_of, lumped_areas(blocks, system.size), places)
+
+    def at_end(self, problem: Problem, x: Array) -> tuple[Problem, Array, Forces]:
+        """Equations at the end x of a step, x with the means there, and the forces.
+
+        No slip of the step is left in the equations, so that a motion that continues from x has the
+        same forces.
+        """
+        assert isinstance(problem, ContactProblem)
+        x, forces = self._with_means(problem, x)
+        problem = replace(problem, old=x, latest=[])
+        if _rubs(self.body):
+            forces = Forces.of(problem, x, self.body.roles)
+            forces = _with_friction(forces, problem, x, self.body)
+        return problem, x, forces
+
+    def require_own_pressures(self, problem: Problem, x: Array) -> None:
+        """Raise StudyError where pressures of the start are not those of its penetrations."""
+        given, own = x[self.pressures], self._with_means(problem, x)[0][self.pressures]
+        size = float(np.abs([*own, *given]).max(initial=0.0))
+        if given.any() and float(np.abs(given - own).max()) > _SAME * size:
+            raise StudyError(
+                f"explicit: the start has contact pressures up to {given.max():.3g} "
+                "MPa without penetration, which a penalty needs: start without contact, from a "
+                'motion by "explicit", or march by "generalised-alpha"'
+            )
+
+    def stored_energy(self, forces: Forces, x: Array) -> float:
+        """Energy of the penalties, p^2 / (2 rho) over the contact, at x, (n,).
+
+        Forces p n and -p n at points that are g n apart, times their places, are p g per area.
+        """
+        return 0.5 * float(forces.contact @ (self.places + x))
+
+    def frequency_squared(self, problem: Problem) -> float:
+        """Bound of that of the penalties."""
+        fixed = np.zeros(self.body.static_system.size, dtype=bool)
+        fixed[problem.fixed] = True
+        contacts = self.body.static_system.contacts
+        return frequency_squared(contacts, self.body.lumped_masses, fixed)  # type: ignore[arg-type]
+
+    def _with_means(self, problem: Problem, x: Array) -> tuple[Array, Forces]:
+        """x with pressures and shear stresses that are means about the nodes, and the forces."""
+        x = x.copy()
+        x[self.pressures] = 0.0
+        forces = Forces.of(problem, x, self.body.roles)
+        x[self.all] += forces.conditions[self.all] / self.areas[self.all]
+        return x, forces

@@ -177,7 +177,7 @@ class EnergyRoles:
 @dataclass(frozen=True, eq=False)
 class Forces:
     """Forces on all unknowns, (n,) each: of loads, of what has an energy, of other pages, of ties
-    and of contacts.
+    and of contacts. conditions: the equations of the multipliers of contacts, zero elsewhere.
 
     Where they are spread over processes, what the elements of this one add.
     """
@@ -187,6 +187,7 @@ class Forces:
     others: Array
     ties: Array
     contact: Array
+    conditions: Array
 
     @classmethod
     def of(cls, problem: Problem, x: Array, roles: EnergyRoles) -> Forces:
@@ -199,9 +200,11 @@ class Forces:
             if part is not None and block.name in problem.parameters:
                 local = block.residual(x, problem.parameters[block.name])
                 np.add.at(part, block.dofs.ravel(), local.ravel())
+        conditions = np.zeros(size)
+        conditions[roles.multipliers] = parts["contact"][roles.multipliers]
         for name in ("tie", "contact"):
             parts[name][roles.multipliers] = 0.0
-        return cls(*parts.values())
+        return cls(*parts.values(), conditions)
 
     @property
     def total(self) -> Array:

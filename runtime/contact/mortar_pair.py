@@ -52,7 +52,13 @@ class MortarPairKernel:
 
     def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """Element residuals (n, ndof)."""
-        return self.tangent(coordinates, dofs, **kwargs)[0]
+        n, ndof = dofs.shape
+        R = np.zeros((n, ndof))
+        if n:
+            at = _PairGeometry.of(self, coordinates, dofs, kwargs["data"], varied=False)
+            for weight, point in at.points():
+                self._add(R, None, at, weight, point)
+        return R
 
     def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
         """Element residuals (n, ndof) and tangents (n, ndof, ndof)."""
@@ -69,30 +75,36 @@ class MortarPairKernel:
         return np.empty((len(dofs), 0, 0))
 
     def _add(
-        self, R: Array, K: Array, at: _PairGeometry, weight: _Varied, point: _IntegrationPoint
+        self,
+        R: Array,
+        K: Array | None,
+        at: _PairGeometry,
+        weight: _Varied,
+        point: _IntegrationPoint,
     ) -> None:
-        """Add a point of all triangles in place."""
+        """Add a point of all triangles in place; K is None where only residuals are needed."""
         n, width = len(R), 3 * at.nodes
         z, dz = point.inputs
         law = np.concatenate([z, at.limits], axis=1)
-        f, derivatives = self.law.tangent(
-            np.empty((n, 0)),
-            np.ascontiguousarray(law[:, :16]),
-            data=np.ascontiguousarray(law[:, 16:]),
-            parameters=np.empty(0),
-        )
+        arrays = np.empty((n, 0)), np.ascontiguousarray(law[:, :16])
+        given = {"data": np.ascontiguousarray(law[:, 16:]), "parameters": np.empty(0)}
         W, dW = weight
         rows = [0, 1, 2, 12, 13, 14, 15]
-        f = f[:, rows]
-        df = W[:, None, None] * np.einsum("nij,njm->nim", derivatives[:, rows], dz)
-        df += f[:, :, None] * dW[:, None]
-        f = W[:, None] * f
+        if K is None:
+            f = W[:, None] * self.law.residual(*arrays, **given)[:, rows]
+        else:
+            values, derivatives = self.law.tangent(*arrays, **given)
+            df = W[:, None, None] * np.einsum("nij,njm->nim", derivatives[:, rows], dz)
+            df += values[:, rows, None] * dW[:, None]
+            f = W[:, None] * values[:, rows]
         for part, columns, (S, dS) in (
             (slice(width), slice(3), point.node_weights),
             (slice(width, None), slice(3, None), point.multiplier_weights),
         ):
             k, c = S.shape[1], f[:, columns].shape[1]
             R[:, part] += (S[:, :, None] * f[:, None, columns]).reshape(n, k * c)
+            if K is None:
+                continue
             change = S[:, :, None, None] * df[:, None, columns]
             change += dS[:, :, None] * f[:, None, columns, None]
             K[:, part] += change.reshape(n, k * c, -1)
@@ -113,7 +125,8 @@ class _IntegrationPoint:
 class _PairGeometry:
     """Nodes of the elements at rest X, now x, and before, (n, nodes, 3), and multipliers.
 
-    limits: rho, friction, depth, reach.
+    limits: rho, friction, depth, reach. varied: with derivatives by the unknowns of the element;
+    else these have no columns.
     """
 
     pair: MortarPairKernel
@@ -123,17 +136,25 @@ class _PairGeometry:
     multipliers: Array
     limits: Array
     corners: Array
+    varied: bool
 
     @classmethod
     def of(
-        cls, pair: MortarPairKernel, coordinates: Array, dofs: Array, data: Array
+        cls,
+        pair: MortarPairKernel,
+        coordinates: Array,
+        dofs: Array,
+        data: Array,
+        *,
+        varied: bool = True,
     ) -> _PairGeometry:
         n, width = len(dofs), coordinates.shape[1]
         X = coordinates.reshape(n, -1, 3)
         x, previous = (X + v[:, :width].reshape(X.shape) for v in (dofs, data))
         corners = data[:, width + 4 :].reshape(n, 3, CORNER)
         multipliers = dofs[:, width:].reshape(n, -1, MULTIPLIERS)
-        return cls(pair, X, x, previous, multipliers, data[:, width : width + 4], corners)
+        limits = data[:, width : width + 4]
+        return cls(pair, X, x, previous, multipliers, limits, corners, varied)
 
     @property
     def nodes(self) -> int:
@@ -152,7 +173,9 @@ class _PairGeometry:
 
     @property
     def ndof(self) -> int:
-        """Unknowns of an element."""
+        """Unknowns of an element by which there are derivatives."""
+        if not self.varied:
+            return 0
         return 3 * self.nodes + MULTIPLIERS * int(self.multipliers.shape[1])
 
     def points(self) -> Iterator[tuple[_Varied, _IntegrationPoint]]:
@@ -198,7 +221,7 @@ class _PairGeometry:
         L, dL = _shapes(one.linear, xi)
         lam = np.einsum("nk,nkc->nc", L, self.multipliers)
         dlam = np.einsum("nkm,nkc->ncm", dL, self.multipliers)
-        for c in range(MULTIPLIERS):
+        for c in range(MULTIPLIERS if self.varied else 0):
             dlam[:, c, 3 * self.nodes + c :: MULTIPLIERS] += L
         parts = [_minus(y, x), first, second, _minus(were, was), (lam, dlam)]
         z, dz = (np.concatenate([p[i] for p in parts], axis=1) for i in (0, 1))
@@ -210,7 +233,7 @@ class _PairGeometry:
         point, change = self._interpolate(cell, x[:, part], at)
         shape = cell.shape(at[0])
         numbers = range(self.nodes)[part]
-        for c in range(3):
+        for c in range(3 if self.varied else 0):
             change[:, c, [3 * i + c for i in numbers]] += shape
         return point, change
 
@@ -226,7 +249,7 @@ class _PairGeometry:
         gradient = np.einsum("nkd,nkc->ncd", G, x)
         change = np.einsum("nkdm,nkc->ncdm", dG, x)
         numbers = range(self.nodes)[part]
-        for c in range(3):
+        for c in range(3 if self.varied else 0):
             change[:, c][:, :, [3 * i + c for i in numbers]] += G.transpose(0, 2, 1)
         return gradient, change
 

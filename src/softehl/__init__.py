@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from softehl.runtime.analyses.buckling import Buckling
     from softehl.runtime.analyses.callbacks import Series
     from softehl.runtime.analyses.dynamics import UnbalancedStart
+    from softehl.runtime.analyses.explicit_dynamics import StiffContact
     from softehl.runtime.analyses.homogenisation import Cell, Homogenised
     from softehl.runtime.analyses.motion import EnergyGain, Motion
     from softehl.runtime.analyses.solver_options import SolverOptions
@@ -180,6 +181,7 @@ _PUBLIC = {
     "Solution": "softehl.runtime.solve.solution",
     "SolverOptions": "softehl.runtime.analyses.solver_options",
     "Status": "softehl.runtime.solve.solution",
+    "StiffContact": "softehl.runtime.analyses.explicit_dynamics",
     "StepRule": "softehl.runtime.solve.continuation",
     "Study": "softehl.runtime.study",
     "StudyError": "softehl.runtime.definition.problem_definition",
@@ -309,6 +311,7 @@ __all__ = [
     "SolverOptions",
     "Status",
     "StepRule",
+    "StiffContact",
     "Study",
     "StudyError",
     "SymPyNeededError",

@@ -42,7 +42,7 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     (("hessian",), lambda at: at.law == "softened", "history of each term"),
     (("hessian",), lambda at: at.law == "split", "a third derivative of m.isotropic"),
     (
-        ("static state", "equilibrium"),
+        ("static state", "equilibrium", "contact"),
         lambda at: at.analysis == "explicit" and _mixed(at),
         "explicit.*(no mass everywhere|belongs to elements)",
     ),
@@ -53,7 +53,6 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     ),
     (("tied halves",), lambda at: at.solver == "amg", "multigrid needs"),
     (("tied halves",), lambda at: at.constraint == "tied sides", "tied in a circle"),
-    (("contact",), lambda at: at.analysis == "explicit", "takes no contact|explicit.*no mass"),
     (("contact",), lambda at: at.solver == "amg", "multigrid needs"),
 )
 """What a user reads."""
