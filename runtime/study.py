@@ -186,8 +186,12 @@ class Study:
         constant : bool
             True if the tangent does not depend on unknowns: it is evaluated once.
         **given : float, array, callable, Table or list
-            Parameters of the page: numbers, or functions f(t) of the load factor. Data of the page:
-            a number, numbers (n,) of the elements, or a function of the elements' centres (n, dim).
+            Parameters of the page: numbers, or functions f(t) of the load factor. An array in place
+            of a number is (n,) or (n, 1) by element, (n, points) by integration point, or by node
+            of the mesh; a function whose argument is called x or X is one of the coordinates of the
+            points (m, dim). Data of the page: a number, numbers (n,) of the elements, or a function
+            of the elements' centres (n, dim). Data of points (`Model.point_data`): as parameters,
+            but every function is one of coordinates; of history the initial values.
             `Model.nodal_data` by their declared name: one number for each node of the mesh, or a
             function of the nodes' coordinates. Curves (`Model.table`): two lists, ([20, 100], [1.2,
             1.1]), or a `Table`. Networks: layers, as `Model.network` says. Two are set by `march`

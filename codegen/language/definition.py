@@ -171,6 +171,8 @@ class Definition:
         Whether point data have rates.
     cell : str
         Reference cell of a weak form.
+    varying : bool
+        Whether a parameter of the page is data instead.
     point : PointForm or None
         The model at a point.
     arrays : tuple of RunTimeArray
@@ -231,6 +233,8 @@ class Definition:
     """Whether the second half of the point data says how the first moves along a variation."""
     cell: str = ""
     """The cell of a weak form, which could stand on another one, too."""
+    varying: bool = field(default=False, compare=False)
+    """Whether a parameter of the page is data of elements or points instead."""
     point: PointForm | None = field(default=None, compare=False)
     """The same model at a point, from which the kernel of the whole element can be made as well."""
     arrays: tuple[RunTimeArray, ...] = ()

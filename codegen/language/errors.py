@@ -66,6 +66,12 @@ class NeedsElementError(ModelError):
         super().__init__(f"{what}: known in cells only, not on sides and not at a point alone")
 
 
+class PointwiseError(ModelError):
+    """Error of a quantity of the whole element that varies with the point."""
+
+    pointwise = True
+
+
 class NoEquationsError(ModelError):
     """A model states no equations."""
 

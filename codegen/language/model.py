@@ -182,7 +182,7 @@ class Model(ModelBuilder):
         return self._arguments.interpolated_sides(names)
 
     def parameters(self, /, **meanings: str) -> list[sp.Symbol]:
-        """Declare parameters: arguments that are the same for all elements.
+        """Declare parameters: arguments that are the same for all elements, or arrays in a study.
 
         Parameters
         ----------
@@ -194,7 +194,14 @@ class Model(ModelBuilder):
         list of Symbol
             The parameters, in this order.
         """
-        return self._arguments.declare("parameters", meanings)
+        return [symbol for n, text in meanings.items() for symbol in self._parameter(n, text)]
+
+    def _parameter(self, name: str, meaning: str) -> list[sp.Symbol]:
+        """A parameter, or the data of elements or points that a study gives in its place."""
+        array = self._arguments.varying.get(name)
+        if array is None:
+            return self._arguments.declare("parameters", {name: meaning})
+        return (self.data if array == "data" else self.point_data)(**{name: meaning})
 
     def data(self, /, **meanings: str) -> list[sp.Symbol]:
         """Declare data: arguments that differ from element to element.

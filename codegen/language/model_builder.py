@@ -9,7 +9,9 @@ the tasks that are generated. Each part knows the symbols and no other part.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -25,7 +27,13 @@ from softehl.codegen.graph.run_time_arrays import RunTimeArray
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language import local_unknowns
 from softehl.codegen.language.definition import Argument, Condition, Definition, TermHistory
-from softehl.codegen.language.errors import ModelError, NoEquationsError, page_line, warn_page
+from softehl.codegen.language.errors import (
+    ModelError,
+    NoEquationsError,
+    PointwiseError,
+    page_line,
+    warn_page,
+)
 from softehl.codegen.language.flatten import CheckedList, Entries, Matrix
 from softehl.codegen.language.smooth_functions import SmoothFunctions
 from softehl.codegen.language.sympy_lowering import Symbols
@@ -39,13 +47,26 @@ _TIMES = (
 )
 
 
+_VARYING: ContextVar[tuple[tuple[str, str], ...]] = ContextVar("varying", default=())
+
+
+@contextmanager
+def varying_parameters(arrays: tuple[tuple[str, str], ...]) -> Iterator[None]:
+    """Parameters of the models of this context are "data" or "point data", by name."""
+    token = _VARYING.set(arrays)
+    try:
+        yield
+    finally:
+        _VARYING.reset(token)
+
+
 class Arguments:
     """The arrays of one element: which names they hold, in which order, declared in which line.
 
     dof_nodes: of every unknown its name without number, and its node or None. nodal: first unknown
     and number of components of what has unknowns at all nodes. components: basis values of what is
     `interpolated`. directions: nodes of all that the potential is differentiated by. lists:
-    parameters, data and point data.
+    parameters, data and point data. varying: parameters that are data or point data instead.
     """
 
     def __init__(self, symbols: Symbols, nodes: int) -> None:
@@ -64,6 +85,7 @@ class Arguments:
         self.arrays: list[RunTimeArray] = []
         self.term_history: list[TermHistory] = []
         self.term_groups: dict[tuple[str, ...], None] = {}
+        self.varying = dict(_VARYING.get())
         self._declared: dict[str, tuple[Node, str]] = {}
         self._idle: set[str] = set()
 
@@ -209,7 +231,7 @@ class Arguments:
 
     def require(self, conditions: Iterable[Any]) -> None:
         """Conditions on parameters and data, with the line of the model."""
-        declared = self.names("parameters", "data")
+        declared = [*self.names("parameters", "data"), *self.varying]
         for c in conditions:
             if isinstance(c, sp.core.relational.Relational) and c.lhs.is_number:
                 c = c.reversed
@@ -222,6 +244,11 @@ class Arguments:
                 )
             where = Path(page_line()).name
             self.conditions.append(Condition(str(c.lhs), c.rel_op, float(c.rhs), where))
+
+    @property
+    def moved(self) -> bool:
+        """True if a parameter is data instead."""
+        return any(name in self.names("data", "point data") for name in self.varying)
 
     # checks -------------------------------------------------------------------------------------
 
@@ -310,7 +337,7 @@ class Equations:
         value, frozen = symbols.lower(expression), [symbols.lower(s) for s in constant]
         symbols.state("", value)
         if value.varying:
-            raise ModelError(
+            raise PointwiseError(
                 f"the potential of {symbols.model} varies with the point: wrap it in integral(...)"
             )
         self._potentials.append((value, frozen))
@@ -612,6 +639,7 @@ class ModelBuilder:
             parameters=tuple(a.lists["parameters"]),
             data=tuple(a.lists["data"]),
             point_data=tuple(a.lists["point data"]),
+            varying=a.moved,
             rule=self.rule,
             unroll=self.unroll,
             graph=self.graph,

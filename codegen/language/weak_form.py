@@ -22,6 +22,7 @@ from softehl.codegen.language.fields import (
     order_of,
 )
 from softehl.codegen.language.flatten import call_function
+from softehl.codegen.language.model_builder import varying_parameters
 from softehl.codegen.language.point_model import PointModel
 
 T = TypeVar("T")
@@ -40,16 +41,19 @@ class UnsupportedCellError(ModelError):
 class CellOptions:
     """Cells of weak forms by name, and their geometry (None: the default one).
 
-    materials: take only the stress laws of a file, as bodies.
+    materials: take only the stress laws of a file, as bodies. varying: parameters that become
+    "data" of elements or "point data".
     """
 
     cells: tuple[str, ...] = ()
     geometry: str | None = None
     materials: bool = False
+    varying: tuple[tuple[str, str], ...] = ()
 
     def options(self) -> tuple[str, ...]:
         """All of it as texts, for a digest."""
-        return (*self.cells, self.geometry or "", "materials" if self.materials else "")
+        moved = (f"{name} as {array}" for name, array in self.varying)
+        return (*self.cells, self.geometry or "", "materials" if self.materials else "", *moved)
 
 
 DEFAULT_CELL = CellOptions()
@@ -172,7 +176,8 @@ class Page:
                 element(cell.partition("_")[0])
             except ValueError as error:
                 raise UnsupportedCellError(str(error)) from None
-        return [self.definition(cell, on.geometry) for cell in on.cells]
+        with varying_parameters(on.varying):
+            return [self.definition(cell, on.geometry) for cell in on.cells]
 
     def at_point(self, cell: str, geometry: str | None = None) -> PointForm:
         """Return the model at a point of a cell.

@@ -16,7 +16,7 @@ import json
 import multiprocessing
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import Field, dataclass, fields, is_dataclass
+from dataclasses import Field, dataclass, fields, is_dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -37,8 +37,10 @@ if TYPE_CHECKING:
     from softehl.codegen.language.weak_form import CellOptions, Page
 
 
-CellKey: TypeAlias = "tuple[tuple[str, ...], str, bool]"
-"""Cells and geometry ("": the usual one) of weak forms, and whether materials are wanted."""
+CellKey: TypeAlias = "tuple[tuple[str, ...], str, bool, tuple[tuple[str, str], ...]]"
+"""Cells and geometry ("": the usual one) of weak forms, whether materials are wanted, and
+parameters that become data or point data.
+"""
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ class Library:
 
 def folder_of(
     source: Path | Definition | Page | Law,
-    where: CellKey = ((), "", False),
+    where: CellKey = ((), "", False, ()),
     *,
     derivatives: int = 0,
 ) -> Path:
@@ -90,7 +92,6 @@ def definition_of(folder: Path, kernel: str) -> Definition | None:
 
     Raises `ModelFileError` if its file has changed since.
     """
-    from softehl.codegen.language.weak_form import CellOptions
     from softehl.codegen.models.material_elements import law
     from softehl.codegen.tools import model_loader
 
@@ -101,54 +102,54 @@ def definition_of(folder: Path, kernel: str) -> Definition | None:
     if isinstance(source, Path):
         if model_text.digest(model_text.sources(source)) != origin.text:
             raise ModelFileError(f"{source} has changed since it was loaded: start Python anew")
-        cells, geometry, materials = where
-        on = CellOptions(cells, geometry or None, materials)
-        definitions = model_loader.definitions(source, on)
+        definitions = model_loader.definitions(source, _on(where))
     else:
         definitions = _definitions(law(source) if isinstance(source, str) else source, where)
     return next((d for d in definitions if d.name == kernel), None)
 
 
 def _folder_of(source: Path | Definition | Page | Law, where: CellKey, *, derivatives: int) -> Path:
-    cells, geometry, materials = where
     if derivatives:
         return _for_derivatives(source, where, derivatives)
     if not isinstance(source, Path):
         return library(_definitions(source, where)).folder
     sources = model_text.sources(source)
     anywhere = _file_key(sources)
-    on_cells = _file_key(sources, [*cells, geometry, "materials" if materials else ""])
-    files = (None if materials else store.recall(anywhere, source)) or store.recall(
-        on_cells, source
-    )
+    on_cells = _file_key(sources, _texts(where))
+    _, _, materials, varying = where
+    files: Mapping[str, str] | None = store.recall(on_cells, source)
+    if files is None and not (materials or varying):
+        files = store.recall(anywhere, source)
     if files is None:
-        from softehl.codegen.language.weak_form import CellOptions
         from softehl.codegen.tools import model_loader
 
-        on = CellOptions(cells, geometry or None, materials)
-        definitions, inputs = model_loader.definitions_and_inputs(source, on)
+        definitions, inputs = model_loader.definitions_and_inputs(source, _on(where))
         read = inputs.beyond(source, sources)
-        key = None if read is None else on_cells if any(d.cell for d in definitions) else anywhere
-        return library(definitions, key, read).folder
+        any_varies = any(d.varying for d in definitions)
+        usual = _file_key(sources, _texts((*where[:3], ())))
+        on_any = not any(d.cell for d in definitions)
+        key = on_cells if any_varies else anywhere if on_any else usual
+        if varying and not any_varies and read is not None:
+            files = store.recall(key, source)
+        files = files or library(definitions, None if read is None else key, read).files
+        if key != on_cells and varying and read is not None:
+            store.remember(on_cells, files, read)
     return compiled(files)[0]
 
 
 def _for_derivatives(source: Path | Definition | Page | Law, where: CellKey, order: int) -> Path:
     """Folder of the kernels of what derivatives of results are made of."""
-    cells, geometry, materials = where
     key, read = None, None
     if isinstance(source, Path):
-        options = [*cells, geometry, "materials" if materials else "", f"derivatives {order}"]
+        options = [*_texts(where), f"derivatives {order}"]
         sources = model_text.sources(source)
         key = _file_key(sources, options)
         files = store.recall(key, source)
         if files is not None:
             return compiled(files)[0]
-        from softehl.codegen.language.weak_form import CellOptions
         from softehl.codegen.tools import model_loader
 
-        on = CellOptions(cells, geometry or None, materials)
-        definitions, inputs = model_loader.definitions_and_inputs(source, on)
+        definitions, inputs = model_loader.definitions_and_inputs(source, _on(where))
         read = inputs.beyond(source, sources)
         key = None if read is None else key
     else:
@@ -174,8 +175,7 @@ def of_law(name: str, where: CellKey, *, derivatives: int = 0) -> Path:
 
 
 def _folder_of_law(name: str, where: CellKey, *, derivatives: int) -> Path:
-    cells, geometry, _ = where
-    key = store.digest(["law", generator(), name, *cells, geometry, str(derivatives)])
+    key = store.digest(["law", generator(), name, *_texts(where), str(derivatives)])
     files = store.recall(key)
     if files is not None:
         return compiled(files)[0]
@@ -187,16 +187,30 @@ def _folder_of_law(name: str, where: CellKey, *, derivatives: int) -> Path:
 
 def _definitions(source: Definition | Page | Law, where: CellKey) -> list[Definition]:
     from softehl.codegen.language.material import Law
-    from softehl.codegen.language.weak_form import CellOptions, Page
+    from softehl.codegen.language.weak_form import Page
     from softehl.codegen.tools import model_loader
 
-    cells, geometry, _ = where
     if isinstance(source, Law):
         source = source.page()
     if isinstance(source, Page):
         with model_loader.errors_of(source):
-            return source.definitions(CellOptions(cells, geometry or None))
+            return source.definitions(replace(_on(where), materials=False))
     return [source]
+
+
+def _on(where: CellKey) -> CellOptions:
+    """Options of weak forms."""
+    from softehl.codegen.language.weak_form import CellOptions
+
+    cells, geometry, materials, varying = where
+    return CellOptions(cells, geometry or None, materials, varying)
+
+
+def _texts(where: CellKey) -> list[str]:
+    """`CellOptions.options` without an import of SymPy."""
+    cells, geometry, materials, varying = where
+    moved = [f"{name} as {array}" for name, array in varying]
+    return [*cells, geometry, "materials" if materials else "", *moved]
 
 
 def of_files(

@@ -35,6 +35,7 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.errors import ModelError, WrongDomainError
 from softehl.codegen.language.material import Law
 from softehl.codegen.language.model import Model
+from softehl.codegen.language.model_builder import varying_parameters
 from softehl.codegen.language.weak_form import DEFAULT_CELL, CellOptions, Page
 from softehl.codegen.tools.import_record import Inputs, code_of, imports_from
 from softehl.codegen.tools.model_text import ModelFileError, read
@@ -98,7 +99,8 @@ def _pages_and_inputs(
             )
         if not laws_only:
             entries = others if others and not on.materials else [law.page() for law in laws]
-        pages = _make_all(entries, on)
+        with varying_parameters(on.varying):
+            pages = _make_all(entries, on)
     if not pages:
         raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
     check_names(path.name, pages)

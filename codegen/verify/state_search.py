@@ -350,9 +350,10 @@ _RELATIONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": opera
 
 def _allowed(d: Definition, s: State) -> bool:
     """True if the conditions of the model on parameters and data hold."""
-    named = {a.name: v for a, v in zip(d.parameters, s.parameters, strict=True)}
-    named |= {a.name: v for a, v in zip(d.data, s.data, strict=True)}
-    return all(_RELATIONS[c.relation](named[c.name], c.bound) for c in d.conditions)
+    named = {a.name: [v] for a, v in zip(d.parameters, s.parameters, strict=True)}
+    named |= {a.name: [v] for a, v in zip(d.data, s.data, strict=True)}
+    named |= {a.name: [row[k] for row in s.point_data] for k, a in enumerate(d.point_data)}
+    return all(_RELATIONS[c.relation](v, c.bound) for c in d.conditions for v in named[c.name])
 
 
 def _scaled(s: State, factors: Sequence[float]) -> State:

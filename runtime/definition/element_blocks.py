@@ -13,6 +13,11 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.argument_checks import datum, parameter, require_names
 from softehl.runtime.definition.kernel_loading import KernelOrigin
 from softehl.runtime.definition.line_fields import interpolated, placed, require_apart
+from softehl.runtime.definition.point_data import (
+    IntegrationPoints,
+    by_element,
+    varying_parameters,
+)
 from softehl.runtime.definition.problem_definition import (
     Block,
     Number,
@@ -62,10 +67,12 @@ def kinds_of(mesh: Mesh, on: On, cells: str | None) -> tuple[str, ...]:
         return ()  # nodes without faces: for a page of one node
 
 
-def wants_traces(error: BaseException | None) -> bool:
-    """True where a page could not be read because it needs the cells beside a side."""
+def _caused_by(error: BaseException | None, kind: str) -> bool:
+    """True for an error of a page of a kind: "traces", it needs the cells beside a side;
+    "pointwise", a quantity of the whole element varies with the point.
+    """
     while error is not None:
-        if getattr(error, "traces", False):
+        if getattr(error, kind, False):
             return True
         error = error.__cause__
     return False
@@ -173,7 +180,11 @@ def page_on(
     nowhere = np.full((len(nodes), mesh.dimension), np.nan)
     around = nodes if facet is None else nodes[:, facet]
     centres = mesh.points[around].mean(axis=1) if around.size else nowhere
-    data = {d: datum(name, d, arguments[d], centres) for d in kernel.data if d in arguments}
+    data = {
+        d: datum(name, d, by_element(arguments[d], len(nodes)), centres)
+        for d in kernel.data
+        if d in arguments
+    }
     arrays = _arrays(name, kernel, arguments)
     kernel = kernel.with_lengths([len(a.numbers) for a in arrays.values()])
     return Block(
@@ -187,7 +198,9 @@ def page_on(
         previous={d: s for d, s in previous.items() if d not in data},
         rates={d: s for d, s in rates.items() if d not in data},
         accelerations={d: s for d, s in accelerations.items() if d not in data},
-        initial=_initial(name, kernel, arguments, centres, form.rule),
+        initial=_initial(
+            name, kernel, arguments, IntegrationPoints.of(mesh, kernel, kind, around, form.rule)
+        ),
         parameters={
             p: parameter_of(kernel, name, p, arguments[p])
             for p in kernel.parameters
@@ -298,17 +311,16 @@ def _automatic(
 
 
 def _initial(
-    block: str, kernel: Kernel, arguments: Mapping[str, Any], centres: Array, rule: Rule | None
+    block: str, kernel: Kernel, arguments: Mapping[str, Any], points: IntegrationPoints
 ) -> Array | None:
-    """Point data at the start, (n, points, k): numbers or functions of the centres, else zero."""
+    """Point data at the start, (n, points, k); zero where they are not given."""
     if not kernel.point_data:
         return None
     columns = [
-        datum(block, name, arguments.get(name.partition("[")[0], 0.0), centres)
+        points.values(block, name, arguments.get(name.partition("[")[0], 0.0))
         for name in kernel.point_data
     ]
-    points = len((rule or kernel.default_rule).weights)
-    return np.repeat(np.stack(columns, axis=1)[:, None, :], points, axis=1)
+    return np.stack(columns, axis=2)
 
 
 def geometry_of(mesh: Mesh, geometry: str | None) -> str:
@@ -389,7 +401,19 @@ def add_block(
     blocks = definition.blocks
     if name in blocks:
         raise StudyError(f"block {name!r} is there already; blocks: {join_names(blocks)}")
-    kernels = _kernels(definition.mesh, origin, on, cells)
+    mesh = definition.mesh
+    varying = varying_parameters(mesh, arguments, _counts(mesh, on, cells))
+    origin = replace(origin, varying=(*varying.items(),))
+    try:
+        kernels = _kernels(mesh, origin, on, cells)
+    except ValueError as error:
+        pointwise = [n for n, array in varying.items() if array == "point data"]
+        if not pointwise or not _caused_by(error, "pointwise"):
+            raise
+        raise StudyError(
+            f"{name!r}: {join_names(pointwise)} by node, by integration point or as a function of "
+            "coordinates: the page uses it outside of an integral; give an array by element, (n,)"
+        ) from error
     for kernel in kernels:
         label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"
         elements = elements_of(definition.mesh, label, kernel, on, cells)
@@ -402,13 +426,27 @@ def add_block(
         )
 
 
+def _counts(mesh: Mesh, on: On, cells: str | None) -> set[int]:
+    """Numbers of elements on the selected kinds of cells or faces."""
+    if isinstance(on, np.ndarray):
+        return {len(on)}
+    if on is None:
+        return {len(nodes) for nodes in mesh.cells_of(cells).values()}
+    if on == "interior" and on not in mesh.sides:
+        return {len(interior(mesh, kind)) for kind in mesh.cells}
+    try:
+        return {len(nodes) for nodes in mesh.faces(on).values()}
+    except MeshError:
+        return {mesh.nodes(on).size}
+
+
 def _kernels(mesh: Mesh, origin: KernelOrigin, on: On, cells: str | None) -> list[Kernel]:
     """Kernels of a page on the selected kinds of cells or faces."""
     kinds = kinds_of(mesh, on, cells)
     try:
         kernels = [origin.loaded(kinds[0] if kinds else None)]
     except ValueError as error:
-        if on is None or isinstance(on, np.ndarray) or not wants_traces(error):
+        if on is None or isinstance(on, np.ndarray) or not _caused_by(error, "traces"):
             raise
         kinds = beside_of(mesh, on)
         kernels = [origin.loaded(kinds[0])]

@@ -21,7 +21,8 @@ function decorated by `softehl.page`."""
 class KernelOrigin:
     """Origin of kernels. model: one of several of a source. law: it is a stress law.
 
-    cells: kinds of cells that an element of the library is for; empty for any.
+    cells: kinds of cells that an element of the library is for; empty for any. varying: parameters
+    that become "data" of elements or "point data".
     """
 
     source: Any
@@ -29,6 +30,7 @@ class KernelOrigin:
     geometry: str
     law: bool
     cells: tuple[str, ...] = ()
+    varying: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def of(
@@ -64,7 +66,12 @@ class KernelOrigin:
             )
         require_page(self.source)
         return page_loader.load_page(
-            self.source, self.model, cell=kind, geometry=self.geometry, materials=self.law
+            self.source,
+            self.model,
+            cell=kind,
+            geometry=self.geometry,
+            materials=self.law,
+            varying=dict(self.varying),
         )
 
     def differentiated(self, kernel: Kernel, order: int = 1) -> Callable[[], Kernel] | None:
@@ -128,6 +135,7 @@ class DerivativeKernel:
             geometry=origin.geometry,
             materials=origin.law,
             derivatives=derivatives,
+            varying=dict(origin.varying),
         )
 
 

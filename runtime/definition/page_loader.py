@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -21,6 +22,7 @@ class PageLoader(Protocol):
         geometry: str | None = None,
         materials: bool = False,
         derivatives: int = 0,
+        varying: Mapping[str, str] | None = None,
     ) -> Kernel:
         """Return the kernel."""
         ...

@@ -240,12 +240,15 @@ class Call:
         data = np.empty((n, 0)) if arguments.data is None else arguments.data
         data = self._array("data", data, (n, len(kernel.data)))
         parameters = self._parameters(arguments.parameters)
-        for condition in kernel.conditions:
-            self._check(data, parameters, condition)
-        if kernel.point_data or arguments.point_data is not None:
+        columns = len(kernel.point_data)
+        if columns or arguments.point_data is not None:
             at_points = _NOTHING if arguments.point_data is None else arguments.point_data
-            columns = len(kernel.point_data)
             at_points = self._array("point_data", at_points, (n, points, columns))
+        else:
+            at_points = np.empty((n, points, 0))
+        for condition in kernel.conditions:
+            self._check(data, at_points, parameters, condition)
+        if columns or arguments.point_data is not None:
             data = np.hstack([data, at_points.reshape(n, points * columns)])
         return data, parameters
 
@@ -259,13 +262,17 @@ class Call:
             )
         return table, self.rule.shape_functions
 
-    def _check(self, data: Array, parameters: Array, condition: Condition) -> None:
+    def _check(
+        self, data: Array, at_points: Array, parameters: Array, condition: Condition
+    ) -> None:
         name, relation, bound, where = condition
         kernel = self.kernel
         if name in kernel.parameters:
             values = parameters[[kernel.parameters.index(name)]]
-        else:
+        elif name in kernel.data:
             values = data[:, kernel.data.index(name)]
+        else:
+            values = at_points[:, :, kernel.point_data.index(name)]
         invalid = ~RELATIONS[relation](values, bound)
         if invalid.any():
             value_text, allowed = f"{values[invalid][0]:g}", f"{relation} {bound:g}"

@@ -21,6 +21,7 @@ from scipy.sparse import csr_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.element_blocks import facet_nodes
+from softehl.runtime.definition.point_data import integrates_over
 from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.kernels.kernel_call import Rule
 from softehl.runtime.mesh.cells import CELLS, Cell
@@ -28,7 +29,6 @@ from softehl.runtime.suggestions import join_names
 
 RECOVERIES = ("projection", "mean", "spr")
 """How a field comes from the points of a cell to its nodes."""
-_SLACK = 1e-9  # of points and weights of a rule, which belong to the parent cell or do not
 
 
 def nodal_operator(block: Block, recovery: str) -> tuple[Integers, Array]:
@@ -45,7 +45,7 @@ def nodal_operator(block: Block, recovery: str) -> tuple[Integers, Array]:
     cell, facet = CELLS[block.kind], facet_nodes(block.kernel)
     nodes = block.nodes if facet is None else block.nodes[:, facet]
     count = len(rule.weights)
-    if recovery == "mean" or nodes.shape[1] != len(cell.nodes) or not _is_of(rule, cell):
+    if recovery == "mean" or nodes.shape[1] != len(cell.nodes) or not integrates_over(rule, cell):
         operator = np.full((nodes.shape[1], count), 1.0 / count)
     else:
         operator = projection(cell, rule, max(_order(block, cell) - 1, 1))
@@ -77,15 +77,6 @@ def _order(block: Block, cell: Cell) -> int:
     along = block.options.along.values()
     orders = [a if isinstance(a, int) else np.shape(a)[1] - 1 for a in along]
     return max(cell.order, *orders, 1)
-
-
-def _is_of(rule: Rule, cell: Cell) -> bool:
-    """True if the points of a rule are those of the parent cell."""
-    if not cell.dimension or rule.table.shape[1] != cell.dimension + 1:
-        return False
-    size = float(cell.rule(0)[1].sum())
-    inside = all(cell.holds(x, _SLACK) for x in rule.table[:, :-1])
-    return inside and abs(float(rule.weights.sum()) - size) < _SLACK * size
 
 
 def _powers(cell: Cell, degree: int) -> list[tuple[int, ...]]:
@@ -126,7 +117,7 @@ def recover_block(block: Block, points: Array, fields: Array) -> Array:
     Raises StudyError for elements that are no cells.
     """
     rule, cell = block.options.rule or block.kernel.default_rule, CELLS[block.kind]
-    if facet_nodes(block.kernel) is not None or not _is_of(rule, cell):
+    if facet_nodes(block.kernel) is not None or not integrates_over(rule, cell):
         raise StudyError(
             f'recovery = "spr": the elements of {block.name!r} do not integrate over cells; '
             'use "projection"'

@@ -9,7 +9,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.sensitivity.element_derivatives import ArrayRates, ElementDerivatives
-from softehl.runtime.sensitivity.inputs import ArraySeeds, Input
+from softehl.runtime.sensitivity.inputs import ArraySeeds, Input, InputSeeds
 from softehl.runtime.sensitivity.linearised_step import LinearisedStep
 from softehl.runtime.sensitivity.quantities import Quantity
 from softehl.runtime.sensitivity.tape import Tape, blocks_with_history, time_couplings
@@ -36,9 +36,13 @@ def gradient(chain: Sequence[Tape], quantity: Quantity, inputs: Sequence[Input])
     state = _AdjointState([quantity.slope(last), np.zeros(n)])
     for tape in reversed(chain):
         step = last if tape is chain[-1] else LinearisedStep(tape)
-        first = tape is chain[0]
-        state = _step(step, state, weights, inputs, gradients, first=first)
+        moves = [item.seeds(tape) for item in inputs]
+        first = tape is chain[0] and not any(move.points for move in moves)
+        state = _step(step, state, weights, moves, gradients, first=first)
         weights = np.zeros(n)
+    for item, total in zip(inputs, gradients, strict=True):
+        for points in item.seeds(chain[0]).points:
+            points.pull(total, state.histories)
     return gradients
 
 
@@ -46,7 +50,7 @@ def _step(
     step: LinearisedStep,
     state: _AdjointState,
     weights: Array,
-    inputs: Sequence[Input],
+    inputs: Sequence[InputSeeds],
     gradients: list[Array],
     *,
     first: bool,
@@ -69,8 +73,7 @@ def _step(
         for name, elements in step.blocks.items()
     }
     held_slope = slope - step.transposed_times(adjoint)
-    for item, total in zip(inputs, gradients, strict=True):
-        moves = item.seeds(step.tape)
+    for moves, total in zip(inputs, gradients, strict=True):
         for column in moves.columns:
             if column.block in element_gradients:
                 column.pull(total, element_gradients[column.block].by(column.column))

@@ -37,17 +37,32 @@ def along_path(chain: Sequence[Tape], inputs: Sequence[Input]) -> Iterator[Rates
     """Derivatives after each step of a chain by all components of the inputs."""
     seeds = [(k, j) for k, item in enumerate(inputs) for j in range(len(item.value))]
     sizes = [len(item.value) for item in inputs]
-    fronts = [DirectState() for _ in seeds]
+    at_start = [item.seeds(chain[0]) for item in inputs]
+    fronts = [initial_rates(at_start[k], _unit(sizes[k], j)) for k, j in seeds]
     for tape in chain:
         step = LinearisedStep(tape)
         moves = [item.seeds(tape) for item in inputs]
         rates = []
         for (k, j), state in zip(seeds, fronts, strict=True):
-            seed = np.zeros(sizes[k])
-            seed[j] = 1.0
+            seed = _unit(sizes[k], j)
             rates.append(tangent_step(step, moves[k], seed, state))
         unknowns, forces = (np.stack(part, axis=1) for part in zip(*rates, strict=True))
         yield Rates(tape, step, unknowns, forces)
+
+
+def _unit(size: int, number: int) -> Array:
+    """Unit vector (size,)."""
+    seed = np.zeros(size)
+    seed[number] = 1.0
+    return seed
+
+
+def initial_rates(moves: InputSeeds, seed: Array) -> DirectState:
+    """Rates before the first step along one component of an input."""
+    state = DirectState()
+    for points in moves.points:
+        points.push(state.histories, seed)
+    return state
 
 
 def tangent_step(

@@ -77,6 +77,9 @@ class ElementDerivatives:
         dofs: (n, ndof) rates of the unknowns, None for none.
         """
         assert self.page is not None
+        if not self.page.kernel.history:  # point data that stay as they are
+            assert self.block.point_data is not None
+            return np.zeros_like(self.block.point_data)
         kernel, direction = self._kernel("fields_rate"), np.zeros_like(self.dofs)
         along = np.hstack([rows, direction if dofs is None else dofs])
         arguments = self._arguments(history, arrays)

@@ -16,7 +16,12 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.sensitivity.direct import DirectState, argument_rates, tangent_step
+from softehl.runtime.sensitivity.direct import (
+    DirectState,
+    argument_rates,
+    initial_rates,
+    tangent_step,
+)
 from softehl.runtime.sensitivity.element_curvatures import Adjoints, ElementCurvatures, Variation
 from softehl.runtime.sensitivity.inputs import Input, InputSeeds, Key, Move
 from softehl.runtime.sensitivity.linearised_step import LinearisedStep
@@ -109,11 +114,15 @@ class _Path:
             for m, record in enumerate(row):
                 rates[m] = back.rate(rates[m], record, directions[:, m], products[:, m])
             adjoint = back.previous(adjoint, back.gradients)
+        for points in self.moves(self.chain[0]).points:
+            for m, state in enumerate(rates):
+                points.pull(products[:, m], state.histories)
         return products
 
     def _forward(self, directions: Array) -> list[list[_Record]]:
         """Rates along all directions, step after step."""
-        states = [DirectState() for _ in directions.T]
+        at_start = self.moves(self.chain[0])
+        states = [initial_rates(at_start, seed) for seed in directions.T]
         records = []
         for tape in self.chain:
             step, moves, row = LinearisedStep(tape), self.moves(tape), []
@@ -125,7 +134,7 @@ class _Path:
 
     def moves(self, tape: Tape) -> InputSeeds:
         """All that moves with the inputs in a step; targets count all components."""
-        columns, prescribed = [], []
+        columns, prescribed, points = [], [], []
         for start, item in zip(self._starts, self.inputs, strict=True):
             seeds = item.seeds(tape)
             if seeds.arrays:
@@ -135,7 +144,8 @@ class _Path:
                 )
             columns += [replace(c, target=_shifted(c.target, start)) for c in seeds.columns]
             prescribed += [replace(h, target=_shifted(h.target, start)) for h in seeds.prescribed]
-        return InputSeeds(columns, prescribed)
+            points += [replace(p, first=p.first + start) for p in seeds.points]
+        return InputSeeds(columns, prescribed, points=points)
 
     def bends(self, tape: Tape, direction: Array) -> InputSeeds:
         """Rates of the factors of prescribed values."""

@@ -23,6 +23,7 @@ from softehl.runtime.sensitivity.inputs import (
     PageArray,
     PageDatum,
     PageParameter,
+    PagePointDatum,
     SupportValue,
 )
 from softehl.runtime.suggestions import did_you_mean, join_names
@@ -121,8 +122,11 @@ def _of_page(owner: str, name: str, blocks: list[Block]) -> Input:
         return PageDatum((owner, name), blocks)
     if name in blocks[0].arrays:
         return PageArray((owner, name), blocks)
+    at_points = [n for n in kernel.point_data if "[" not in n]
+    if name in at_points:
+        return PagePointDatum((owner, name), blocks)
     numbers = [n for n in blocks[0].parameters if n not in kernel.functions]
-    names = [*numbers, *blocks[0].data, *blocks[0].arrays]
+    names = [*numbers, *blocks[0].data, *blocks[0].arrays, *at_points]
     raise StudyError(
         f"by: {owner!r} ({kernel.name}) has no {name!r}{did_you_mean(name, names)}; it has "
         f"{join_names(names)}"

@@ -6,7 +6,7 @@ factor of it, which is 1.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeAlias
 
@@ -79,12 +79,41 @@ class ArraySeeds:
 
 
 @dataclass(frozen=True, eq=False)
+class PointSeeds:
+    """Data of the points of a block, at the beginning of a path, that move with an input.
+
+    column: among the point data. shape: (n, points, k) of all of them. first: component of the
+    input that is the first of its values.
+    """
+
+    block: str
+    column: int
+    shape: tuple[int, ...]
+    first: int = 0
+
+    def push(self, histories: dict[str, Array], seed: Array) -> None:
+        """Add the rates of the point data when the input moves by seed."""
+        rates = histories.setdefault(self.block, np.zeros(self.shape))
+        rates[:, :, self.column] += seed[self._components].reshape(self.shape[:2])
+
+    def pull(self, gradient: Array, histories: Mapping[str, Array]) -> None:
+        """Add the derivatives by point data to the gradient."""
+        if self.block in histories:
+            gradient[self._components] += histories[self.block][:, :, self.column].ravel()
+
+    @property
+    def _components(self) -> slice:
+        return slice(self.first, self.first + self.shape[0] * self.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
 class InputSeeds:
-    """All that moves with an input in one step."""
+    """All that moves with an input in one step; points: only at the beginning of a path."""
 
     columns: Sequence[InputColumn] = field(default=())
     prescribed: Sequence[PrescribedSeeds] = field(default=())
     arrays: Sequence[ArraySeeds] = field(default=())
+    points: Sequence[PointSeeds] = field(default=())
 
     def pull_prescribed(self, gradient: Array, slopes: Array) -> None:
         """Add derivatives (n,) by prescribed values to the gradient."""
@@ -246,6 +275,54 @@ class PageDatum:
     def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
         """See `Input`."""
         return []
+
+
+@dataclass(frozen=True, eq=False)
+class PagePointDatum:
+    """Data of the points of a page at the beginning, one number a point of each element."""
+
+    key: Key
+    blocks: Sequence[Block]
+    scalar: bool = False
+
+    @property
+    def value(self) -> Array:
+        """See `Input`."""
+        return np.concatenate([_initial(b)[:, :, self._column(b)].ravel() for b in self.blocks])
+
+    def seeds(self, tape: Tape) -> InputSeeds:
+        """See `Input`."""
+        seeds, first = [], 0
+        for block in self.blocks:
+            shape = _initial(block).shape
+            seeds.append(PointSeeds(block.name, self._column(block), shape, first))
+            first += shape[0] * shape[1]
+        return InputSeeds(points=seeds)
+
+    def put(self, definition: ProblemDefinition, value: Array) -> None:
+        """See `Input`."""
+        first = 0
+        for block in self.blocks:
+            block_now = definition.blocks[block.name]
+            initial = _initial(block_now).copy()
+            count = initial[:, :, 0].size
+            part = np.asarray(value[first : first + count])
+            initial[:, :, self._column(block)] = part.reshape(initial.shape[:2])
+            definition.blocks[block.name] = replace(block_now, initial=initial)
+            first += count
+
+    def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
+        """See `Input`."""
+        return []
+
+    def _column(self, block: Block) -> int:
+        return block.kernel.point_data.index(self.key[1])
+
+
+def _initial(block: Block) -> Array:
+    """Point data of a block that has some, (n, points, k)."""
+    assert block.initial is not None
+    return block.initial
 
 
 @dataclass(frozen=True, eq=False)

@@ -105,7 +105,7 @@ class Tape:
 def depends_on_previous(system: System) -> bool:
     """True if a step depends on the steps before it."""
     blocks = system.blocks.values()
-    return any(b.previous or b.rates or b.initial is not None for b in blocks)
+    return any(b.previous or b.rates or b.kernel.history for b in blocks)
 
 
 def continued_tape(system: System, start: Tape | None) -> Tape | None:

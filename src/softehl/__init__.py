@@ -7,7 +7,7 @@ solves a case loads no SymPy and `softehl --help` loads nothing at all.
 import dataclasses
 import importlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -383,6 +383,7 @@ def load_kernel(
     geometry: str | None = None,
     materials: bool = False,
     derivatives: int = 0,
+    varying: "Mapping[str, str] | None" = None,
 ) -> "Kernel":
     """Return a compiled kernel; derive and compile it if the cache does not have it.
 
@@ -404,6 +405,9 @@ def load_kernel(
         1: add the tasks `pseudo_load` and `fields_rate`, for derivatives of results; the point data
         are then those of the page and the rate of each. 2: only the tasks `adjoint_rate` and
         `point_adjoint_rate`, for second derivatives; the adjoint of each datum and its rate follow.
+    varying : mapping of str to str, optional
+        Parameters of a page of fields or of a material that become "data" of elements or "point
+        data"; other names are ignored.
 
     Returns
     -------
@@ -423,7 +427,8 @@ def load_kernel(
 
     # os.path: a name that is too long for a file is none
     folder_given = isinstance(source, (str, Path)) and os.path.isdir(source)
-    where = (() if cell is None else (cell,), geometry or "", materials)
+    moved = tuple(sorted((varying or {}).items()))
+    where = (() if cell is None else (cell,), geometry or "", materials, moved)
     if isinstance(source, str) and not source.endswith(".py") and not folder_given:
         if materials:
             from softehl.codegen.tools import library
@@ -436,6 +441,7 @@ def load_kernel(
                     geometry=geometry,
                     materials=True,
                     derivatives=derivatives,
+                    varying=varying,
                 )
             with with_sympy():
                 from softehl.codegen.tools.kernel_cache import of_law

@@ -108,6 +108,31 @@ class Law:
         return load_kernel(source, cell=cell, geometry=geometry, materials=law)
 
 
+@dataclass(frozen=True, eq=False)
+class LawAtPoints(Law):
+    """A law whose `lame` is given at the points of the quadrature."""
+
+    def add(
+        self,
+        study: Study,
+        name: str = "body",
+        cells: str | None = None,
+        *,
+        again: bool = False,
+        **constants: float,
+    ) -> None:
+        """See `Law`."""
+        lame: Any = constants.get("lame", self.given["lame"])
+        given: Any = {**constants, "lame": lambda x: np.full(len(x), lame)}
+        super().add(study, name, cells, again=again, **given)
+
+    @cache  # noqa: B019
+    def kernel(self, cell: str, geometry: str | None) -> Kernel:
+        """See `Law`."""
+        moved = {"lame": "point data"}
+        return load_kernel(self.page, cell=cell, geometry=geometry, varying=moved)
+
+
 _RUBBER = {"mu": 0.4, "lame": 0.6}
 _MIXED = {"mu": 0.4, "K": 5.0}
 _OGDEN = {"mu_1": 0.5, "alpha_1": 1.6, "mu_2": -0.04, "alpha_2": -2.0, "mu_3": 0.01, "alpha_3": 4.0}
@@ -127,6 +152,7 @@ LAWS = {
     "whole element": Law(_RUBBER, pages.whole),
     "loops over points": Law(_RUBBER, pages.point),
     "product": Law(_RUBBER, pages.product),
+    "points": LawAtPoints(_RUBBER, pages.energy),
     "energy of a material": Law(_RUBBER, material=pages.energy_law),
     "stress of a material": Law(_RUBBER, material=pages.stress_law),
     "local unknown": Law(_RUBBER, pages.local_stretch),
