@@ -41,7 +41,7 @@ oring: $(VENV)/.kernels
 test: $(VENV)/.dev $(VENV)/.kernels
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-slow: $(VENV)/.dev $(VENV)/.kernels
+slow: $(VENV)/.compiler $(VENV)/.kernels
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
 
 wheel: $(VENV)/.dev
@@ -128,6 +128,11 @@ $(VENV)/.installed: pyproject.toml $(VENV)/.created
 
 $(VENV)/.dev: $(VENV)/.installed
 	$(PIP) install --editable '.[dev]'
+	@touch $@
+
+# a compiler of 400 MB for the tests of machines without one, and of other systems
+$(VENV)/.compiler: $(VENV)/.dev
+	$(PIP) install --editable '.[dev,compiler]'
 	@touch $@
 
 $(VENV)/.mpi: $(VENV)/.dev

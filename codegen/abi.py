@@ -152,7 +152,7 @@ class BuildError(SoftehlError, RuntimeError):
 
 
 class NoCompilerError(BuildError):
-    """There is no C compiler: $CC is not set, and there is no cc on the PATH."""
+    """There is no C compiler: $CC is not set, none is on the PATH, and there is no ziglang."""
 
 
 class Target(StrEnum):

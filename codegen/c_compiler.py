@@ -1,40 +1,130 @@
-"""The C compiler of the user as a command, and its calls."""
+"""The C compiler as a command, the flags that it understands, and its calls.
+
+It is $CC, else the first of `SYSTEM` on the PATH, else the one that the package `ziglang` brings
+(`pip install 'softehl[compiler]'`): a clang with the headers and libraries of C, for machines that
+have no compiler.
+"""
 
 from __future__ import annotations
 
 import os
+import platform
 import shlex
 import shutil
 import subprocess
 from collections.abc import Sequence
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
 
 from softehl.codegen.abi import BuildError, NoCompilerError
+from softehl.log import LOG
+
+SYSTEM = () if os.name == "nt" else ("cc", "gcc", "clang")
+"""Names of compilers of the system. None on Windows: gcc may store vectors of 32 bytes at places
+that the system aligns to 16 (GCC bug 54412), and clang needs the libraries of Visual Studio.
+"""
+GCC_ALONE = ("-fno-tree-pre", "-fschedule-insns2", "-fgcse", "-fpeephole2")
+"""Flags that the command `zig cc` refuses; other clangs ignore them."""
+REMEDY = "install one, set CC to one, or pip install 'softehl[compiler]'"
 
 
 def compiler() -> list[str]:
-    """The C compiler as a command: $CC, or cc from the PATH."""
+    """The C compiler as a command; `cc` where there is none.  Raises BuildError."""
     command = os.environ.get("CC", "")
     try:
-        return shlex.split(command) or ["cc"]
+        words = shlex.split(command, posix=os.name != "nt")
     except ValueError as error:
         reason = str(error)[:1].lower() + str(error)[1:]
         raise BuildError(
             f"CC={command!r} is no command ({reason}): set CC to a C compiler"
         ) from None
+    if words:
+        return [word.strip('"') for word in words]
+    found = next(filter(_is_installed, SYSTEM), None)
+    if found is not None:
+        return [found]
+    zig = ziglang()
+    if zig is None:
+        return ["cc"]
+    _log_ziglang(zig)
+    return [str(zig), "cc"]
+
+
+def ziglang() -> Path | None:
+    """The program `zig` of the package `ziglang`; None where it is not installed."""
+    spec = find_spec("ziglang")
+    folders = [] if spec is None else list(spec.submodule_search_locations or [])
+    programs = [Path(folder) / ("zig.exe" if os.name == "nt" else "zig") for folder in folders]
+    return next((program for program in programs if program.is_file()), None)
+
+
+def supported(command: Sequence[str], flags: Sequence[str]) -> list[str]:
+    """Flags of gcc and clang as a compiler understands them."""
+    if os.name == "nt":  # all code is position independent there
+        flags = [f for f in flags if f != "-fPIC"]
+    if not is_zig(command):
+        return list(flags)
+    kept = [f.replace("x86-64", "x86_64") for f in flags if f not in GCC_ALONE]
+    return [*kept, "-fno-sanitize=undefined"]  # which it would add to -O0 and -O1
+
+
+def is_zig(command: Sequence[str]) -> bool:
+    """True for `zig cc`, by whatever path."""
+    return any(Path(word).stem in ("zig", "ziglang") for word in command[:3])
+
+
+def note() -> str:
+    """What is said of the compiler where a build is reported: empty for one of the system."""
+    return " with the compiler of the package ziglang" if is_zig(compiler()) else ""
 
 
 def called(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
     """Call a command of the compiler; raises BuildError where it cannot be run."""
     if shutil.which(command[0]) is None:
-        kind = BuildError if os.environ.get("CC", "").strip() else NoCompilerError
-        raise kind(
-            f"no C compiler: {command[0]!r} is not on the PATH; install one, or set CC to one"
-        )
+        named = bool(os.environ.get("CC", "").strip())
+        kind, remedy = (BuildError, "set CC to one that is") if named else (NoCompilerError, REMEDY)
+        raise kind(f"no C compiler: {command[0]!r} is not on the PATH; {remedy}")
     try:
         return subprocess.run(
-            command, capture_output=True, text=True, errors="replace", check=False, input=""
+            command,
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",
+            check=False,
+            input="",
         )
     except OSError as error:
         raise BuildError(
             f"{command[0]} cannot be run ({error.strerror}): set CC to a C compiler"
         ) from None
+
+
+@cache
+def _log_ziglang(program: Path) -> None:
+    """One line in the log of a process."""
+    try:
+        release = version("ziglang")
+    except PackageNotFoundError:
+        release = str(program)
+    names = ", ".join(SYSTEM)
+    reason = f"none of {names} is on the PATH" if names else "CC is not set"
+    LOG.info("the C compiler is that of the package ziglang %s: %s", release, reason)
+
+
+def _is_installed(name: str) -> bool:
+    """True for a compiler that can be run: on macOS those of /usr/bin may wait for their tools."""
+    path = shutil.which(name)
+    if path is None or platform.system() != "Darwin" or not path.startswith("/usr/bin/"):
+        return path is not None
+    return _has_command_line_tools()
+
+
+@cache
+def _has_command_line_tools() -> bool:
+    try:
+        done = subprocess.run(["xcode-select", "-p"], capture_output=True, check=False)
+    except OSError:
+        return False
+    return done.returncode == 0

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from softehl.codegen.abi import BuildError
-from softehl.codegen.c_compiler import called, compiler
+from softehl.codegen.c_compiler import called, compiler, supported
 
 HIGHEST = 2
 """Order of derivatives up to which there is a place for them."""
@@ -267,7 +267,9 @@ def _library(f: ExternalFunction) -> Any:
     source, target = folder / "external.c", folder / "external.so"
     source.write_text(f.source(), encoding="utf-8")
     flags = ["-std=c11", "-O1", "-fPIC", "-shared"]
-    done = called([*compiler(), *flags, str(source), "-o", str(target), "-lm"])
+    command = compiler()
+    flags = supported(command, flags)
+    done = called([*command, *flags, str(source), "-o", str(target), "-lm"])
     if done.returncode != 0:
         raise BuildError(f"{f.file} cannot be compiled: {_first_error(f, done.stderr)}")
     loaded = ctypes.CDLL(str(target))

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import array
 import importlib
-import os
-import stat
 import sys
 import time
 from functools import cache
@@ -13,6 +10,7 @@ from types import TracebackType
 from typing import Any, TextIO
 
 from softehl.errors import SoftehlError
+from softehl.system import unread_bytes
 
 
 class MissingPetsc(SoftehlError, ValueError):  # noqa: N818 (named after what it is)
@@ -120,16 +118,9 @@ def _everywhere(comm: Any) -> bool:
 
 def _await_reader(stream: TextIO) -> None:
     """Wait until the launcher has read the stream, a pipe: MPI_Abort drops what is unread."""
-    import fcntl  # late: not on Windows
-    import termios
-
-    unread, end = array.array("i", [0]), time.monotonic() + _READ
+    end = time.monotonic() + _READ
     try:
-        out = stream.fileno()
-        while stat.S_ISFIFO(os.fstat(out).st_mode) and time.monotonic() < end:
-            fcntl.ioctl(out, termios.FIONREAD, unread)
-            if not unread[0]:
-                return
+        while unread_bytes(stream) and time.monotonic() < end:
             time.sleep(0.01)
     except (OSError, ValueError):  # nothing to wait for: closed, or no file at all
         return

@@ -27,6 +27,7 @@ from softehl.cases.app.page import Page
 from softehl.cases.app.runs import Desk
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.signals import Ended
+from softehl.system import END_SIGNALS
 
 HOST = "127.0.0.1"
 _PAGE, _LOGIN = "/desk", "/refused"
@@ -158,7 +159,7 @@ def _ended_by(loop: Any) -> Iterator[list[int]]:
         numbers.append(number)
         loop.add_callback_from_signal(loop.stop)
 
-    previous = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    previous = {number: signal.signal(number, end) for number in END_SIGNALS}
     try:
         yield numbers
     finally:

@@ -9,6 +9,8 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
+from softehl.system import END_SIGNALS
+
 
 class Ended(BaseException):
     """A signal that asks the process to end: what was reached is saved on the way out."""
@@ -20,7 +22,7 @@ class Ended(BaseException):
 
 @contextmanager
 def signals() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP end a run as Ctrl-C does; in the main thread only."""
+    """Let the signals that ask for it end a run as Ctrl-C does; in the main thread only."""
 
     def end(number: int, _: FrameType | None) -> None:
         raise Ended(number)
@@ -28,7 +30,7 @@ def signals() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    previous = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    previous = {number: signal.signal(number, end) for number in END_SIGNALS}
     try:
         yield
     finally:
@@ -56,7 +58,7 @@ class _Stream:
         try:
             self._stream.flush()
         except BrokenPipeError:
-            self._stream = open(os.devnull, "w")  # noqa: SIM115 (it lives as long as we do)
+            self._stream = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (it lives as long as we do)
 
 
 @contextmanager
@@ -66,7 +68,7 @@ def readers_that_leave() -> Iterator[None]:
     A stream that is closed from the start, as by `>&-`, is None in Python.
     """
     previous = sys.stdout, sys.stderr
-    with open(os.devnull, "w") as nobody:
+    with open(os.devnull, "w", encoding="utf-8") as nobody:
         sys.stdout, sys.stderr = (_Stream(nobody if s is None else s) for s in previous)
         try:
             yield

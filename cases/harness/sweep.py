@@ -37,6 +37,7 @@ from softehl.cases.harness.runner import NOT_CONVERGED, compute, writing
 from softehl.cases.harness.study_file import Study
 from softehl.folder_lock import FolderLock
 from softehl.runtime.io import Cell, number_text, read_json, write_csv, write_json
+from softehl.system import name_fault
 
 _LONGEST = 120
 
@@ -174,9 +175,12 @@ def named(
 def _require_plain(name: object, case: AnyCase) -> None:
     """Raise BadInput unless a name is one component of a path, and none that has a meaning."""
     invalid = not isinstance(name, str) or name != name.strip() or name in ("", ".", "..")
-    if invalid or set(str(name)) & {"/", "\\", "\0"} or name == case.shared:
+    why = name_fault(str(name))
+    if invalid or why or name == case.shared:
         reserved = f", and {case.shared!r} is taken" if case.shared else ""
-        raise BadInput(f"{name!r} is no name for a curve; allowed: a plain folder name{reserved}")
+        reason = f" ({why})" if why and not invalid else ""
+        allowed = f"a plain folder name{reserved}"
+        raise BadInput(f"{name!r} is no name for a curve{reason}; allowed: {allowed}")
     if len(str(name)) > _LONGEST:
         raise BadInput(f"the name {str(name)[:20]}... is too long; allowed: {_LONGEST} letters")
 

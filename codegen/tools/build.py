@@ -11,7 +11,6 @@ machine, into the user's cache (`codegen.tools.shipped_kernels`) and prints wher
 from __future__ import annotations
 
 import hashlib
-import os
 import platform
 import shlex
 import shutil
@@ -24,9 +23,10 @@ from pathlib import Path
 from time import perf_counter
 
 from softehl.codegen.abi import VERSION, BuildError, NoCompilerError
-from softehl.codegen.c_compiler import called, compiler
+from softehl.codegen.c_compiler import called, compiler, is_zig, supported
 from softehl.codegen.emit import c_runtime
 from softehl.codegen.tools import cache_store
+from softehl.system import processors
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 COMMON = (
@@ -104,26 +104,28 @@ def build(
     sources = sorted(
         directory.glob("*.c"), key=lambda path: -path.stat().st_size
     )  # long ones first
-    command = [*compiler(), *flags]
+    command = compiler()
     with tempfile.TemporaryDirectory(prefix=".part-", dir=directory) as scratch:
         objects = [Path(scratch) / f"{source.stem}.o" for source in sources]
-        compiling = [word for word in command if word != "-shared"]
+        compiling = [flag for flag in flags if flag != "-shared"]
 
         def compiled(source: Path, to: Path) -> float:
             start = perf_counter()
             text = source.read_text(encoding="utf-8")
             lanes = [] if wide is None or source.stem in wide else ["-DSOFTEHL_LANES=1"]
-            arguments = [*compiling, *extra_flags(source, text), *lanes, *extra]
+            own = [*compiling, *extra_flags(source, text), *lanes, *extra]
+            arguments = [*command, *supported(command, own)]
             if source.name.startswith(SHARED):
                 shutil.copyfile(_shared(source, text, arguments, flags), to)
             else:
                 _run([*arguments, define, "-c", str(source), "-o", str(to)], to)
             return perf_counter() - start
 
-        with ThreadPoolExecutor(_processors()) as pool:
+        with ThreadPoolExecutor(processors()) as pool:
             seconds = list(pool.map(compiled, sources, objects))
         linked = Path(scratch) / LIBRARY
-        _run([*command, *extra, *map(str, objects), "-o", str(linked), "-lm"], linked)
+        linking = [*command, *supported(command, [*flags, *extra])]
+        _run([*linking, *map(str, objects), "-o", str(linked), "-lm"], linked)
         data = linked.read_bytes()
     cache_store.write(directory / LIBRARY, data, mode=0o755)
     cache_store.write(directory / DIGEST, f"{_sha256(data)}  {LIBRARY}\n".encode(), mode=0o644)
@@ -157,13 +159,20 @@ def _shared(source: Path, text: str, command: Sequence[str], flags: Sequence[str
 
 
 def tuned_flags() -> tuple[tuple[str, ...], str]:
-    """Flags for this processor if the compiler supports it, and its `identification`."""
+    """Flags for this processor if the compiler supports it, and its `identification`.
+
+    The gcc of MinGW does not: it may store vectors of AVX where they are not aligned.
+    """
     try:
-        return FLAGS, identification(FLAGS)
+        tuned = identification(FLAGS)
     except NoCompilerError:
         raise
     except BuildError:
         return PLAIN, identification(PLAIN)
+    macros = macros_of(tuned)
+    if "__MINGW32__" in macros and "__clang__" not in macros:
+        return PLAIN, identification(PLAIN)
+    return FLAGS, tuned
 
 
 def identification(flags: Sequence[str] = FLAGS) -> str:
@@ -171,15 +180,32 @@ def identification(flags: Sequence[str] = FLAGS) -> str:
 
     Its predefined macros hold all of that, the instruction set of -march=native included.
     """
-    command = [*compiler(), *(f for f in flags if f != "-shared"), "-dM", "-E", "-x", "c", "-"]
-    done = called(command)
+    command = compiler()
+    accepted = supported(command, [f for f in flags if f != "-shared"])
+    done = called([*command, *accepted, "-dM", "-E", "-x", "c", "-"])
     if done.returncode != 0 or "#define __STDC__" not in done.stdout:
         message = " ".join((done.stderr or done.stdout).split())[:200] or "nothing"
         raise BuildError(
-            f"{shlex.join(compiler())} does not answer as a C compiler does "
+            f"{shlex.join(command)} does not answer as a C compiler does "
             f"(exit code {done.returncode}: {message}): set CC to one"
         )
-    return shlex.join([*compiler(), *flags]) + "\n" + done.stdout
+    return shlex.join([*command, *flags]) + "\n" + done.stdout
+
+
+def macros_of(identified: str) -> dict[str, str]:
+    """Values of predefined macros by name, of an `identification`."""
+    lines = (line.split(maxsplit=2) for line in identified.splitlines()[1:])
+    return {words[1]: words[2] if len(words) > 2 else "" for words in lines if len(words) > 1}
+
+
+def compiler_name() -> str:
+    """Kind, version and command of the compiler, for people.  Raises BuildError."""
+    macros = macros_of(tuned_flags()[1])
+    version = macros.get("__VERSION__", "").strip('"')
+    kind = "" if "__clang__" in macros or "__GNUC__" not in macros else "gcc "
+    command = compiler()
+    package = ", package ziglang" if is_zig(command) else ""
+    return f"{kind}{version}{package}: {shlex.join(command)}"
 
 
 def _run(command: Sequence[str], makes: Path) -> None:
@@ -191,12 +217,6 @@ def _run(command: Sequence[str], makes: Path) -> None:
         raise BuildError(
             f"{command[0]} is no C compiler (it wrote nothing): set CC to one\n  {line}"
         )
-
-
-def _processors() -> int:
-    """Number of processors that this process may use."""
-    allowed = getattr(os, "sched_getaffinity", None)  # not on macOS
-    return len(allowed(0)) if allowed else os.cpu_count() or 1
 
 
 def _sha256(data: bytes) -> str:

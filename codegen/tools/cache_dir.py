@@ -9,7 +9,6 @@ from __future__ import annotations
 import atexit
 import os
 import shutil
-import stat
 import sys
 import tempfile
 from functools import cache
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from softehl.errors import SoftehlError
 from softehl.log import warn
+from softehl.system import rights_fault
 
 _REMEDY = "set SOFTEHL_CACHE to a folder of yours that can be written"
 
@@ -56,14 +56,7 @@ def require_own(folder: Path) -> Path:
 
 def fault(folder: Path) -> str:
     """Why code in a folder is not to be run; empty if it may.  Raises OSError."""
-    if not hasattr(os, "geteuid"):
-        return ""
-    status = folder.stat()
-    if status.st_uid != os.geteuid():
-        return f"it belongs to another user, number {status.st_uid}; {_REMEDY}"
-    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        return f"others may write to it; delete it, or if all is yours: chmod -R go-w {folder}"
-    return ""
+    return rights_fault(folder, _REMEDY)
 
 
 def configured() -> Path:

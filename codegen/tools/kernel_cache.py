@@ -25,6 +25,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from softehl.codegen import abi
+from softehl.codegen.c_compiler import note
 from softehl.codegen.tools import build, model_text
 from softehl.codegen.tools import cache_store as store
 from softehl.codegen.tools.model_text import ModelFileError
@@ -247,7 +248,7 @@ def library(
     names = ", ".join(d.name for d in definitions)
     with BuildProgress() as progress:
         files, derived = derive(definitions, progress)
-        progress.begin(f"compiling {names}")
+        progress.begin(f"compiling {names}{note()}")
         folder, seconds = compiled(files)
         if check:
             progress.begin(f"checking {names}")
@@ -313,9 +314,11 @@ def derive(
     definitions: Sequence[Definition], progress: BuildProgress | None = None
 ) -> tuple[dict[str, str], dict[str, float]]:
     """Every generated file, and seconds by kernel (empty if they were remembered)."""
+    from softehl.codegen.tools.model_loader import require_file_name
     from softehl.codegen.verify.random_states import check_external_functions
 
     for d in definitions:
+        require_file_name(d.name)
         if d.addresses:  # a function of this process, which no digest knows
             check_external_functions(d)
     key = store.digest(["models", generator(), *(fingerprint(d) for d in definitions)])

@@ -39,6 +39,7 @@ from softehl.codegen.language.model_builder import varying_parameters
 from softehl.codegen.language.weak_form import DEFAULT_CELL, CellOptions, Page
 from softehl.codegen.tools.import_record import Inputs, code_of, imports_from
 from softehl.codegen.tools.model_text import ModelFileError, read
+from softehl.system import name_fault
 
 _RECIPE = (
     "write `def my_model() -> Definition:` that ends in `return m.finish()`, or `@softehl.page` "
@@ -144,12 +145,20 @@ def _at_most(seconds: float) -> Iterator[None]:
 
 
 def check_names(where: str, models: Iterable[Definition | Law]) -> None:
-    """Raise `ModelFileError` unless the names are different."""
+    """Raise `ModelFileError` unless the names are different, and names of files everywhere."""
     seen: set[str] = set()
     for d in models:
+        require_file_name(d.name)
         if d.name in seen:
             raise ModelFileError(f"{where}: two models are called {d.name}; rename one")
         seen.add(d.name)
+
+
+def require_file_name(name: str) -> None:
+    """Raise `ModelFileError` for a name of a model that no file can have on some system."""
+    fault = name_fault(f"{name}.c")
+    if fault:
+        raise ModelFileError(f"{name} cannot name a model, whose files are called so: {fault}")
 
 
 # ------------------------------------------------------------------------------------- running it

@@ -22,6 +22,7 @@ from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.kernels.shared_library import Action
 from softehl.runtime.mesh.cells import CELLS, Cell
+from softehl.system import processors
 
 GROUP = 8
 """Elements of a group at most, whatever the processor."""
@@ -54,7 +55,7 @@ def require_product(block: ElementBlock) -> Kernel:
 def threads() -> int:
     """Threads that products use: $OMP_NUM_THREADS, or what the process may use."""
     setting = os.environ.get("OMP_NUM_THREADS", "")
-    return int(setting) if setting.isdigit() and int(setting) > 0 else len(os.sched_getaffinity(0))
+    return int(setting) if setting.isdigit() and int(setting) > 0 else processors()
 
 
 @dataclass(frozen=True, eq=False)

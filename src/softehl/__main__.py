@@ -182,8 +182,10 @@ def _commands() -> "click.Group":
 
     @commands.command()
     def kernels() -> int:
-        """Show what the kernels cost, and which compiled library of them is used."""
+        """Show what the kernels cost, and which library and C compiler are used."""
         from softehl.cases.harness.errors import BadInput
+        from softehl.codegen.abi import BuildError
+        from softehl.codegen.tools.build import compiler_name
         from softehl.codegen.tools.cost_table import kernels
         from softehl.runtime.kernels.shared_library import KernelError, library_of
 
@@ -194,6 +196,10 @@ def _commands() -> "click.Group":
         code = kernels()
         why = f" ({library.reason})" if library.reason else ""
         click.echo(f"{library.kind} library{why}: {library.path}")
+        try:
+            click.echo(f"compiler {compiler_name()}")
+        except BuildError as error:
+            click.echo(f"no compiler: {error}")
         return code
 
     commands.add_command(design)

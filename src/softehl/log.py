@@ -1,7 +1,7 @@
 """The package's logger, `logging.getLogger("softehl")`: silent until a script configures it.
 
 DEBUG has Newton's iterations, INFO load and time steps and builds of kernels that take more than
-two seconds, WARNING warnings of states and files.
+two seconds and the compiler where it is that of a package, WARNING warnings of states and files.
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ from typing import Any
 
 import pytest
 
+from softehl.codegen import c_compiler
 from softehl.codegen.tools import build
 
 SOURCE = build.GENERATED.parent / "src"
@@ -101,9 +102,13 @@ def contents(place: Path) -> dict[str, bytes]:
     return {str(p): p.read_bytes() for p in files}
 
 
-def without_compiler(tmp_path: Path) -> dict[str, str]:
+def without_compiler(place: Path, tmp_path: Path) -> dict[str, str]:
+    """Nothing on the PATH, and a package `ziglang` without a program."""
     (tmp_path / "empty").mkdir()
-    return {"PATH": str(tmp_path / "empty")}
+    (tmp_path / "hiding" / "ziglang").mkdir(parents=True)
+    (tmp_path / "hiding" / "ziglang" / "__init__.py").write_text("")
+    paths = f"{tmp_path / 'hiding'}{os.pathsep}{place}"
+    return {"PATH": str(tmp_path / "empty"), "PYTHONPATH": paths}
 
 
 # ------------------------------------------------------------------------------ tuned and plain
@@ -122,7 +127,7 @@ def test_the_first_use_tunes_the_kernels_and_later_ones_find_them(wheel: Path, c
 
 def test_without_a_compiler_the_plain_library_serves_silently(wheel: Path, tmp_path: Path) -> None:
     before = contents(wheel)
-    kind, path, said = used(using(wheel, **without_compiler(tmp_path)))
+    kind, path, said = used(using(wheel, **without_compiler(wheel, tmp_path)))
     assert (kind, said) == ("plain", "")
     assert path == wheel / "softehl" / "generated" / build.LIBRARY
     assert contents(wheel) == before
@@ -139,8 +144,8 @@ def missing(process: subprocess.Popen[str]) -> str:
 
 
 def test_a_checkout_without_a_compiler_says_what_to_do(checkout: Path, tmp_path: Path) -> None:
-    last = missing(using(checkout, **without_compiler(tmp_path)))
-    assert last.endswith("no C compiler: 'cc' is not on the PATH; install one, or set CC to one")
+    last = missing(using(checkout, **without_compiler(checkout, tmp_path)))
+    assert last.endswith(f"no C compiler: 'cc' is not on the PATH; {c_compiler.REMEDY}")
 
 
 def test_the_plain_library_can_be_asked_for(wheel: Path, checkout: Path, cache: Path) -> None:

@@ -68,7 +68,7 @@ def test_deriving_needs_one_extra_more() -> None:
 
 def test_there_is_an_extra_for_each_purpose() -> None:
     wanted = {"amg", "benchmarks", "cad", "cluster", "dev", "docs", "fast", "generate", "mpi"}
-    wanted |= {"app", "hosts", "plot", "report"}
+    wanted |= {"app", "compiler", "hosts", "plot", "report"}
     assert set(PROJECT["optional-dependencies"]) == wanted
 
 
