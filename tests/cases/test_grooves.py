@@ -428,11 +428,15 @@ def warned(*assignments: str) -> str:
 
 
 def test_rubber_and_oil_in_the_cold_are_not_what_they_are_taken_for() -> None:
-    cold = warned("material=NBR 70", "oil=HLP 32", "temperature=-35")
-    assert "rubber is stiffer in the cold, the more the nearer to -50 degC" in cold
-    assert "the pour point of HLP 32 may be as high as -18 degC (DIN 51524)" in cold
-    said = "its modulus at room temperature, not at -35 degC"
-    assert said in assumptions("material=NBR 70", "oil=HLP 32", "temperature=-35")
+    cold = "material=NBR 70", "oil=HLP 32", "temperature=-20"
+    assert "is 10 K above the glass transition of NBR 70, -30 degC" in warned(*cold)
+    assert "the pour point of HLP 32 may be as high as -18 degC (DIN 51524)" in warned(*cold)
+    assert "times its modulus at room temperature, by a glass transition of" in str(
+        assumptions(*cold)
+    )
+    unknown = "shore_A=70", *cold[1:]
+    assert "rubber is stiffer in the cold; give glass_transition" in warned(*unknown)
+    assert "its modulus at room temperature, not at -20 degC" in assumptions(*unknown)
     assert "pour point" not in warned("oil=HVLP 32", "temperature=-25")
     assert "may be as high as -30 degC" in warned("oil=HVLP 32", "temperature=-35")
     assert "below both viscosities" in warned(WATER_GLYCOL[0], "temperature=-10")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import log10
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from softehl.cases.oring import CASE
 from softehl.cases.seal.equations.loads import ContactLoads
 from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.rubbers.conditions import glassy_share, shift
 from softehl.cases.seal.gland.rubbers.materials import (
     MATERIALS,
     nominal_stress,
@@ -124,6 +127,88 @@ def test_a_hardness_makes_a_neo_hookean_rubber() -> None:
     ]
     for more in others:
         assert Seal(shore_A=70.0, **more).shear_modulus == pytest.approx(p.shear_modulus)
+
+
+# --- Rubber in service: cold, swollen, set -------------------------------------------------------
+
+
+def seal(**given: Any) -> Seal:
+    return Seal(**given)
+
+
+def test_the_shift_of_williams_landel_and_ferry() -> None:
+    """log a_T = -17.44 (T - T_g) / (51.6 + T - T_g): -8.72 at 51.6 K, and 10 s at T_g."""
+    assert log10(shift(51.6)) == pytest.approx(-8.72)
+    assert (shift(0.0), glassy_share(0.0)) == (1.0, 0.5)
+    above = 10.0
+    assert glassy_share(above) == pytest.approx(1 / (1 + (10.0 / (10.0 * shift(above))) ** 0.7))
+
+
+def test_the_modulus_of_a_named_rubber_in_the_cold() -> None:
+    """Constant above 23 degC, entropic on request, doubled 15 K above the glass transition."""
+    at_room = seal(material="NBR 70").shear_modulus
+    assert seal(material="NBR 70", temperature=80.0).shear_modulus == at_room
+    cold = seal(material="NBR 70", temperature=-15.0)
+    assert cold.shear_modulus == pytest.approx(
+        at_room + 1000.0 * (glassy_share(15.0) - glassy_share(53.0))
+    )
+    assert 1.8 < cold.shear_modulus / at_room < 2.2
+    assert seal(**cold.model_dump()) == cold
+    assert seal(**{**cold.settled(), "mu": 5.0}).shear_modulus == 5.0
+    warm = seal(material="NBR 70", temperature=80.0, modulus_rule="entropic")
+    assert warm.shear_modulus / at_room == pytest.approx(353.15 / 296.15)
+    given = seal(material="FKM 75", temperature=-25.0, glass_transition=-40.0)
+    assert given.shear_modulus > 1.5 * seal(material="FKM 75").shear_modulus
+    same = seal(material="FKM 75", temperature=-25.0, modulus_rule="constant")
+    assert same.shear_modulus == seal(material="FKM 75").shear_modulus
+
+
+def test_a_modulus_by_a_table_of_temperatures(tmp_path: Path) -> None:
+    path = tmp_path / "modulus.csv"
+    path.write_text("temperature_degC,shear_modulus_MPa\n23,2\n-20,8\n", encoding="utf-8")
+    p = seal(modulus_table=str(path), temperature=1.5)
+    assert p.shear_modulus == pytest.approx(4.0)
+    assert seal(**p.model_dump()) == p
+    locking = seal(modulus_table=str(path), temperature=23.0, material="gent", J_m=30.0)
+    assert locking.shear_modulus == pytest.approx(2.0)
+    assert "outside -20 to 23 degC" in refused(modulus_table=str(path), temperature=40.0)
+    path.write_text("T,mu\n23,2\n", encoding="utf-8")
+    assert "its first line must be" in refused(modulus_table=str(path), temperature=23.0)
+
+
+def test_swelling_makes_a_ring_larger_and_softer() -> None:
+    """8 % in volume: lengths by 1.08^(1/3), modulus by Flory's 1.08^(-1/3), the gland unchanged."""
+    dry = seal(ring="36x4", rod="36 f7", material="NBR 70")
+    wet = seal(ring="36x4", rod="36 f7", material="NBR 70", swelling=8.0)
+    factor = 1.08 ** (1 / 3)
+    assert wet.section_diameter == pytest.approx(4.0 * factor)
+    assert wet.inner_diameter == pytest.approx(36.0 * factor)
+    assert wet.volume == pytest.approx(1.08 * dry.volume)
+    assert wet.shear_modulus == pytest.approx(dry.shear_modulus / factor)
+    assert (wet.housing_diameter, wet.groove_width) == (dry.housing_diameter, dry.groove_width)
+    assert seal(**wet.model_dump()) == wet
+    assert seal(**wet.settled()).section_diameter == wet.section_diameter
+    assert "section 4 to 4.104 mm, squeeze 12 to 14.3 %" in " ".join(CASE.foreword(wet))
+
+
+def test_a_set_leaves_its_part_of_the_squeeze() -> None:
+    sides: list[dict[str, Any]] = [{"rod": 36.0}, {"bore": 44.0}]
+    for slides in sides:
+        new = seal(ring="36x4", **slides)
+        old = seal(ring="36x4", **slides, compression_set=20.0)
+        left = (old.section_diameter - old.depth) / (new.section_diameter - new.depth)
+        assert left == pytest.approx(0.8)
+        assert old.ring_diameter == pytest.approx(new.ring_diameter)
+        assert seal(**old.model_dump()) == old
+
+
+def test_a_hardness_on_another_scale() -> None:
+    """46 Shore D are 95 Shore A in the chart of ASTM D2240; IRHD are taken as Shore A."""
+    assert seal(material="PU 46 Shore D").shear_modulus == seal(material="PU 95").shear_modulus
+    assert seal(material="NBR 70 IRHD").shear_modulus == seal(material="NBR 70").shear_modulus
+    p = seal(material="PU 46D")
+    assert "46 Shore D as 95 Shore A" in " ".join(CASE.assumed(p, {"material"}))
+    assert seal(**p.model_dump()) == p
 
 
 def test_a_fit_of_another_machine_agrees() -> None:

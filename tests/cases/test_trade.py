@@ -30,7 +30,7 @@ from softehl.cases.seal.gland.trade.normalise_text import NotUnderstoodError
 from softehl.cases.seal.gland.trade.oil_names import GRADES as OIL_GRADES
 from softehl.cases.seal.gland.trade.oil_names import dynamic, read_oil_name
 from softehl.cases.seal.gland.trade.ring_names import RingName, read_ring
-from softehl.cases.seal.gland.trade.rubber_names import RubberName, read_rubber
+from softehl.cases.seal.gland.trade.rubber_names import read_rubber
 from softehl.cases.shipped import SHIPPED
 
 # --- What seal engineers type: understood, or answered with what to write -------------------------
@@ -222,7 +222,11 @@ def test_oils() -> None:
 
 def test_rubbers() -> None:
     for name, (polymer, shore) in DATA["rubbers"].items():
-        assert read_rubber("material", name) == RubberName(polymer, shore), name
+        found = read_rubber("material", name)
+        assert found is not None
+        assert (found.polymer, found.shore_A) == (polymer, shore), name
+        assert ("IRHD" in found.said) == ("IRHD" in name)
+        assert read_rubber("material", found.text) == found
     assert [read_rubber("material", name) for name in DATA["no_names"]] == [None] * len(
         DATA["no_names"]
     )
@@ -370,6 +374,44 @@ def test_roelands_at_the_pressures_of_seals() -> None:
     p = Seal(oil="ISO VG 46", temperature=40.0, roelands=z)
     assert p.pressure_viscosity == pytest.approx(barus_of_roelands(p.viscosity, z))
     assert Seal(**p.model_dump()) == p
+
+
+@pytest.mark.parametrize(
+    ("name", "at_40", "at_100", "rho", "share"),
+    [
+        ("HFC 46", 46.0, 9.604, 1080.0, 0.135),
+        ("HFD-R 46", 46.0, 5.3, 1140.0, 1.3),
+        ("HEES 32", 32.0, 6.457, 920.0, 0.75),
+        ("HETG 46", 46.0, 9.930, 920.0, 0.8),
+        ("PAO 46", 46.0, 7.825, 840.0, 0.7),
+    ],
+)
+def test_fluids_that_are_no_mineral_oils(
+    name: str, at_40: float, at_100: float, rho: float, share: float
+) -> None:
+    law = read_oil(name)
+    assert (law(40.0), law(100.0)) == pytest.approx((at_40, at_100), rel=2e-3)
+    p = typed(f"oil={name} at 40 degC")
+    assert p.viscosity == pytest.approx(at_40 * density(40.0, rho) * 1e-12)
+    assert p.pressure_viscosity == pytest.approx(share * barus(p.viscosity))
+    assert Seal(**p.model_dump()) == p
+    (told,) = (line for line in said(p) if "typical of a" in line)
+    assert f"the density {rho:g} kg/m3" in told
+    own: dict[str, Any] = {
+        "oil": name,
+        "temperature": 40.0,
+        "oil_density": 900.0,
+        "pressure_viscosity": 0.01,
+    }
+    assert "density" not in " ".join(CASE.assumed(Seal(**own), own))
+
+
+def test_what_a_fluid_does_to_rubber_is_said() -> None:
+    hot = " ".join(CASE.warnings(typed("oil=HFC 46 at 70 degC", "material=PU 95")))
+    assert "PU does not resist HFC 46 at 70 degC, a water-glycol" in hot
+    assert "HFC fluids are used to 60 degC" in hot
+    fkm = " ".join(CASE.warnings(typed("oil=HFDR 46 at 50 degC", "material=FKM 75")))
+    assert "resist" not in fkm
 
 
 def test_wooster() -> None:

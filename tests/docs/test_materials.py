@@ -12,8 +12,8 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers.hardness import shore_band, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import MATERIALS, shear_modulus
 from softehl.cases.seal.gland.rubbers.rubber_fit import fit, read_data
-from softehl.cases.seal.gland.trade.oil_names import GRADES
-from softehl.cases.seal.gland.trade.rubber_names import RANGES, read_rubber
+from softehl.cases.seal.gland.trade.oil_names import FAMILIES, GRADES
+from softehl.cases.seal.gland.trade.rubber_names import GLASS, RANGES, read_rubber
 from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import Silent
 
@@ -51,10 +51,11 @@ def test_fits_of_treloars_rubber() -> None:
 def test_polymers() -> None:
     known = {f"`{name}`": ends for name, ends in RANGES.items() if ends}
     table = rows("materials.md", "polymers")
-    assert {name: degC for name, _, degC in table} == {
-        name: f"{low:g} to {high:g}" for name, (low, high) in known.items()
+    assert {name: (degC, glass) for name, _, degC, glass in table} == {
+        name: (f"{low:g} to {high:g}", f"{GLASS[name[1:-1]]:g}" if name[1:-1] in GLASS else "-")
+        for name, (low, high) in known.items()
     }
-    for name, also, _ in table:
+    for name, also, *_ in table:
         for word in filter(None, also.split(", ")):
             read = read_rubber("material", f"{word} 70")
             assert read is not None
@@ -71,6 +72,17 @@ def test_glands() -> None:
 def test_grades() -> None:
     table = rows("oils.md", "grades")
     assert {int(n.split()[-1]): float(hot) for n, _, hot in table} == GRADES
+
+
+def test_families_of_fluids() -> None:
+    for name, kind, rho, index, share in rows("oils.md", "families"):
+        family = FAMILIES[name[1:-1]]
+        assert (kind, float(rho), float(share)) == (
+            family.kind,
+            family.density,
+            family.pressure_share,
+        )
+        assert index == ("-" if family.index is None else f"{family.index:g}")
 
 
 @pytest.mark.slow

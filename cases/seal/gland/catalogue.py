@@ -74,10 +74,11 @@ def ring_gland(name: str | None, section: float, kind: Kind, shape: str = "round
 
     A ring of JIS B 2401 has the groove of that standard, except in pneumatics.
     """
-    if name and kind != "pneumatic" and shape == "round" and read_ring(name).code:
-        groove = ring(name).groove
-        if groove is not None and groove.section_diameter == section:
-            return groove
+    if name and read_ring(name).outer is None:
+        found = ring(name)
+        section = found.section_diameter  # as it was made: the seal may have swollen
+        if found.groove is not None and kind != "pneumatic" and shape == "round":
+            return found.groove
     return gland(section, kind, shape)
 
 

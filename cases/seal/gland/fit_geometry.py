@@ -16,8 +16,9 @@ from softehl.cases.seal.gland.catalogue import ring_gland
 from softehl.cases.seal.gland.grooves import KINDS, Groove, cup_gland
 from softehl.cases.seal.gland.key_values import agree, number, put, value_text
 from softehl.cases.seal.gland.records import OF_PISTON, FreeSeal, Gland
+from softehl.cases.seal.gland.rubbers.conditions import swollen_length
 from softehl.cases.seal.gland.rubbers.materials import KEYS
-from softehl.cases.seal.gland.sections.section_keys import section_of_file
+from softehl.cases.seal.gland.sections.section_keys import MEASURES, section_of_file
 from softehl.cases.seal.gland.sections.shapes import UCup, parts_of
 from softehl.cases.seal.gland.trade.parse_terms import bands, texts
 from softehl.cases.seal.gland.trade.ring_names import read_ring
@@ -36,6 +37,9 @@ def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
     refused with their keys.
     """
     values = dict(given)
+    service = {k: float(values[k]) for k in _SERVICE if number(values.get(k))}
+    if service:
+        return _in_service(values, **service)
     _with_outline(values)
     if isinstance(values.get("ring"), int):
         values["ring"] = str(values["ring"])  # "-226" is a number to a reader of TOML
@@ -51,6 +55,43 @@ def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
         _in_piston(values)
     _with_gland(values)
     return values
+
+
+_SERVICE = ("swelling", "compression_set")
+"""Keys of what service makes of the sizes of a ring, %."""
+
+
+def _in_service(
+    values: dict[str, Any], swelling: float = 0.0, compression_set: float = 0.0
+) -> dict[str, Any]:
+    """The keys of a ring that has swollen and lost a part of its squeeze for good.
+
+    It is put into the gland of the new ring. Swelling is free and alike in all directions; a set
+    takes a part of the squeeze from the section, so that of h - t, section less depth, (1 - C) is
+    left. Raises ValueError.
+    """
+    if not isinstance(values.get("ring"), str) or read_ring(values["ring"]).outer is not None:
+        raise ValueError(
+            'swelling and compression_set need a ring by its name, as in ring = "36x4"; for '
+            "another seal give its sizes as they are in service"
+        )
+    if sizes := [name for name in MEASURES if values.get(name) is not None]:
+        raise ValueError(f"swelling, compression_set and {sizes[0]}: give the sizes in service")
+    sized = ("inner_diameter", "section_diameter", *_SERVICE)
+    fresh = fitted({k: v for k, v in values.items() if k not in sized})
+    rod, housing = fresh.get("rod_diameter"), fresh.get("housing_diameter")
+    if not (number(rod) and number(housing)):
+        return values  # refused with its key
+    ring, factor = catalogue.ring(values["ring"]), swollen_length(swelling)
+    section, depth = factor * ring.section_diameter, 0.5 * (housing - rod)
+    section -= 0.01 * compression_set * max(section - depth, 0.0)
+    inner = factor * ring.inner_diameter
+    in_service = {k: v for k, v in fresh.items() if k not in sized}
+    in_service |= {k: values[k] for k in sized if values.get(k) is not None}
+    source = f'ring = "{values["ring"]}" in service'
+    put(in_service, "section_diameter", section, source)
+    put(in_service, "inner_diameter", inner if rod > 0.0 else -(inner + 2.0 * section), source)
+    return in_service
 
 
 def _with_outline(values: dict[str, Any]) -> None:

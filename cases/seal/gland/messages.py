@@ -5,18 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any
 
-from softehl.cases.seal.gland.catalogue import ring_gland
+from softehl.cases.seal.gland.catalogue import ring, ring_gland
+from softehl.cases.seal.gland.grooves import squeeze
 from softehl.cases.seal.gland.key_values import value_text
 from softehl.cases.seal.gland.oils import DENSITY
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import Gland
 from softehl.cases.seal.gland.rubbers import materials
-from softehl.cases.seal.gland.rubbers.hardness import shore_band
+from softehl.cases.seal.gland.rubbers.conditions import (
+    NEAR,
+    ROOM,
+    modulus_at,
+    swollen_modulus,
+)
+from softehl.cases.seal.gland.rubbers.hardness import shore_band, youngs_modulus
 from softehl.cases.seal.gland.sections.section_keys import ROUND, dimensions
-from softehl.cases.seal.gland.trade.oil_names import IMPROVED, POUR, read_oil_name
+from softehl.cases.seal.gland.trade.oil_names import IMPROVED, POUR, Family, read_oil_name
 from softehl.cases.seal.gland.trade.parse_terms import understood
 from softehl.cases.seal.gland.trade.ring_names import read_ring
-from softehl.cases.seal.gland.trade.rubber_names import GLASS, RANGES
+from softehl.cases.seal.gland.trade.rubber_names import RANGES, read_rubber
 
 
 def foreword(p: Seal, pressure: float) -> list[str]:
@@ -26,7 +33,27 @@ def foreword(p: Seal, pressure: float) -> list[str]:
     run. pressure: the largest sealed pressure, MPa.
     """
     load, beyond = _load(p, pressure)
-    return [*understood(p.said, piston=p.piston), *([] if beyond or not pressure else [load])]
+    ratio = [] if beyond or not pressure else [load]
+    return [*understood(p.said, piston=p.piston), *_in_service(p), *ratio]
+
+
+def _in_service(p: Seal) -> Iterator[str]:
+    """Swelling and set: what they make of section, modulus and squeeze."""
+    if not p.ring or (p.swelling is None and p.compression_set is None):
+        return
+    new = ring(p.ring).section_diameter
+    parts = [
+        f"{name.replace('_', ' ')} {value:g} %"
+        for name, value in (("swelling", p.swelling), ("compression_set", p.compression_set))
+        if value is not None
+    ]
+    modulus = ""
+    if p.swelling is not None and p.shore_A is not None:
+        modulus = f", modulus {swollen_modulus(p.swelling):.3g} times that of the new rubber"
+    yield (
+        f"{' and '.join(parts)}: section {new:.4g} to {p.section_diameter:.4g} mm, squeeze "
+        f"{squeeze(new, p.depth):.3g} to {p.squeeze_percent:.3g} %{modulus}"
+    )
 
 
 def warnings(p: Seal, pressure: float) -> list[str]:
@@ -59,7 +86,12 @@ def _load(p: Seal, pressure: float) -> tuple[str, bool]:
 # --- warnings -----------------------------------------------------------------------------------
 
 _NEEDS: Mapping[str, tuple[Callable[[Seal], Any], str]] = {
-    "temperature": (lambda p: p.oil or p.fit, "an oil or a fit"),
+    "temperature": (
+        lambda p: p.oil or p.fit or p.modulus_table or _by_temperature(p),
+        "an oil, a fit, or a rubber by its hardness in the cold",
+    ),
+    "glass_transition": (lambda p: p.shore_A is not None, "a hardness"),
+    "modulus_rule": (lambda p: p.shore_A is not None, "a hardness"),
     "ogden_terms": (lambda p: p.fit, "a fit"),
     "corner_fillet": (lambda p: p.opens, "an extrusion_gap"),
     "cavitation_penalty": (lambda p: not p.conserving, 'cavitation = "penalty"'),
@@ -99,8 +131,10 @@ def _unusual(p: Seal) -> Iterator[str]:
             f"pressure_viscosity = {alpha:g} 1/MPa: oils have 0.01 to 0.04, water-glycols about "
             "0.003 (1e-8 1/Pa is 0.01 1/MPa)"
         )
-    if p.polymer in SWOLLEN and p.oil and read_oil_name(p.oil).grade:
-        yield f"{p.polymer} swells in mineral oil, and its modulus falls; {p.oil} is one"
+    if p.swelling is not None and p.shore_A is None:
+        yield "swelling: the modulus is taken as that of the swollen rubber, not changed by it"
+    if p.oil and read_oil_name(p.oil).grade:
+        yield from _not_resistant(p, read_oil_name(p.oil).family)
     if "speeds" in type(p).model_fields and max(p.speeds) > FASTEST:
         yield (
             f"a speed of {max(p.speeds):g} mm/s: reciprocating seals are used to {FASTEST:g} mm/s, "
@@ -113,6 +147,21 @@ def _unusual(p: Seal) -> Iterator[str]:
         yield (
             f"temperature = {p.temperature:g} degC: {p.polymer} is used from {used[0]:g} to "
             f"{used[1]:g} degC"
+        )
+
+
+def _not_resistant(p: Seal, family: Family | None) -> Iterator[str]:
+    """A polymer that its oil swells or attacks, and a fluid that is too hot."""
+    if family is None:
+        if p.polymer in SWOLLEN:
+            yield f"{p.polymer} swells in mineral oil, and its modulus falls; {p.oil} is one"
+        return
+    if p.polymer in family.attacks:
+        yield f"{p.polymer} does not resist {p.oil}, a {family.kind}: it swells or decays"
+    if family.highest is not None and (p.temperature or 0.0) > family.highest:
+        yield (
+            f"temperature = {p.temperature:g} degC: {family.name} fluids are used to "
+            f"{family.highest:g} degC"
         )
 
 
@@ -137,27 +186,64 @@ def _cold(p: Seal) -> Iterator[str]:
     heat = p.temperature
     if heat is None:
         return
-    if p.shore_A is not None and heat < 0.0:
-        note = f", the more the nearer to {GLASS[p.polymer]:g} degC" if p.polymer in GLASS else ""
-        yield (
-            f"temperature = {heat:g} degC: the modulus is that of a hardness at room temperature; "
-            f"rubber is stiffer in the cold{note}; give mu at this temperature, or tests (fit)"
-        )
+    if p.shore_A is not None:
+        yield from _cold_rubber(p, heat)
+    for part, region in p.materials.items():
+        if region.shore_A is not None and heat < 0.0:
+            yield (
+                f"temperature = {heat:g} degC: materials.{part} has its modulus at room "
+                "temperature; give mu at this temperature"
+            )
     if p.oil is None:
         return
     name = read_oil_name(p.oil)
-    if name.points and heat < min(0.0, *(at for _, at in name.points)):
+    measured = [at for _, at in name.points] or ([40.0, 100.0] if name.family else [])
+    if measured and heat < min(0.0, *measured):
         yield (
             f"temperature = {heat:g} degC is below both viscosities of the oil: it is "
             "extrapolated, and below its pour point the oil does not flow (see its data sheet)"
         )
     improved = name.index is not None and name.index >= IMPROVED
-    pour = POUR.get((name.grade or 0, improved))
+    pour = None if name.family else POUR.get((name.grade or 0, improved))
     if pour is not None and heat < pour:
         yield (
             f"temperature = {heat:g} degC: the pour point of {p.oil} may be as high as {pour:g} "
             "degC (DIN 51524); below its pour point an oil does not flow (see its data sheet)"
         )
+
+
+def _cold_rubber(p: Seal, heat: float) -> Iterator[str]:
+    """A rubber by its hardness near its glass transition, or of an unknown one."""
+    glass = p.glass
+    if glass is None or p.modulus_rule == "constant":
+        if heat < 0.0:
+            yield (
+                f"temperature = {heat:g} degC: the modulus is that of a hardness at room "
+                "temperature; rubber is stiffer in the cold; give glass_transition, mu at this "
+                "temperature, or tests (fit)"
+            )
+        return
+    if heat < glass + NEAR:
+        lower, upper = (_stiffer(p, glass + away) for away in (-3.0, 3.0))
+        yield (
+            f"temperature = {heat:g} degC is {heat - glass:.0f} K above the glass transition of "
+            f"{p.compound or 'the rubber'}, {glass:g} degC: its modulus is "
+            f"{_stiffer(p, glass):.2g} times that at room temperature by rule "
+            f"({lower:.2g} to {upper:.2g} times if that is known to 3 K), and its damping "
+            "is left out; give glass_transition, or measured values (modulus_table)"
+        )
+
+
+def _stiffer(p: Seal, glass: float | None) -> float:
+    """Modulus of a hardness at the temperature of the seal over that at room temperature."""
+    mu = youngs_modulus(p.shore_A or 0.0, p.polymer) / 3.0
+    heat = ROOM if p.temperature is None else p.temperature
+    return modulus_at(mu, heat, glass, p.modulus_rule) / mu
+
+
+def _by_temperature(p: Seal) -> bool:
+    """True if the modulus of a hardness is another one at the temperature of the seal."""
+    return p.shore_A is not None and _stiffer(p, p.glass) != 1.0
 
 
 def handbook(p: Gland) -> Iterator[str]:
@@ -180,7 +266,7 @@ def assumed(p: Seal, set_keys: Collection[str]) -> list[str]:
     return [*_ring(p, keys_set), *_gland(p, keys_set), *_fluids(p, keys_set)]
 
 
-_RUBBER = frozenset(("material", "compound", "shore_A", "fit", *materials.KEYS))
+_RUBBER = frozenset(("material", "compound", "shore_A", "modulus_table", "fit", *materials.KEYS))
 """Keys that a rubber is given by."""
 
 
@@ -201,13 +287,30 @@ def _ring(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
             f"a shear modulus of {p.shear_modulus:.3g} MPa by hardness, known to {low:+.0f} and "
             f"{high:+.0f} %"
         )
-        if p.temperature is not None:
-            yield f"its modulus at room temperature, not at {p.temperature:g} degC"
+        yield from _hardness(p)
     elif p.energy == "mooney_rivlin" and len(unsaid := {"mu_1", "mu_2"} - keys_set) == 1:
         (name,) = unsaid
         yield f"{name} = {getattr(p, name):g} MPa"
-    elif not keys_set & {"fit", "shore_A", *materials.KEYS}:
+    elif not keys_set & _RUBBER - {"material"}:
         yield f"a rubber of shear modulus {p.shear_modulus:.3g} MPa"
+
+
+def _hardness(p: Seal) -> Iterator[str]:
+    """Another scale than Shore A, and the temperature."""
+    rubber = read_rubber("compound", p.compound) if p.compound else None
+    if rubber and rubber.said:
+        chart = " (chart of ASTM D2240)" if "D" in rubber.said.split() else ""
+        yield f"{rubber.said} as {p.shore_A:g} Shore A{chart}"
+    if p.temperature is None:
+        return
+    factor = _stiffer(p, p.glass)
+    if factor == 1.0:
+        yield f"its modulus at room temperature, not at {p.temperature:g} degC"
+    elif p.glass is not None and p.glass_transition is None:
+        yield (
+            f"{factor:.3g} times its modulus at room temperature, by a glass transition of "
+            f"{p.glass:g} degC, typical of {p.polymer}"
+        )
 
 
 def _gland(p: Gland, keys_set: frozenset[str]) -> Iterator[str]:
@@ -243,6 +346,25 @@ def _kind(p: Gland) -> tuple[str, bool]:
     return "its standard gland", True
 
 
+def _typical(p: Seal, family: Family, keys_set: frozenset[str]) -> Iterator[str]:
+    """What was taken from the family of a fluid."""
+    texts = []
+    if "oil_density" not in keys_set:
+        texts.append(f"the density {family.density:g} kg/m3 at 15 degC")
+    if p.oil and read_oil_name(p.oil).index is None:
+        texts.append(
+            f"the viscosity index {family.index:g}"
+            if family.index is not None
+            else "the fall of the viscosity with temperature"
+        )
+    if not keys_set & {"pressure_viscosity", "roelands"}:
+        texts.append(
+            f"the pressure-viscosity coefficient {p.pressure_viscosity:.3g} 1/MPa (to a third)"
+        )
+    if texts:
+        yield f"{', '.join(texts)}: typical of a {family.kind}"
+
+
 def _fluids(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
     """Pressure and oil."""
     if "sealed_pressure" not in keys_set:
@@ -255,6 +377,8 @@ def _fluids(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
             texts.append(f"the pressure-viscosity coefficient {p.pressure_viscosity:.3g} 1/MPa")
         if texts:
             yield f"{' and '.join(texts)}, of a mineral oil"
+    elif p.oil is not None and (family := read_oil_name(p.oil).family):
+        yield from _typical(p, family, keys_set)
     elif "viscosity" in keys_set and not keys_set & {"pressure_viscosity", "roelands"}:
         yield f"a pressure-viscosity coefficient of {p.pressure_viscosity:g} 1/MPa"
     if p.oil and read_oil_name(p.oil).improved:

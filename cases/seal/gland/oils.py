@@ -56,7 +56,8 @@ class Walther:
 def read_oil(text: str) -> Walther:
     """An oil from its name (trade.oil_names).  Raises ValueError.
 
-    A grade is one of a mineral oil, or has a viscosity index, given or the least of HVLP oils.
+    A grade is one of a mineral oil, or has a viscosity index: given, the least of HVLP oils, or
+    that of its family of fluids.
     """
     name = read_oil_name(text)
     if name.grade is None:
@@ -68,7 +69,13 @@ def read_oil(text: str) -> Walther:
             f"{' and '.join(f'ISO VG {g}' for g in sorted(nearest))}"
         )
     at_40 = float(name.grade)
-    at_100 = GRADES[name.grade] if name.index is None else at_100_of_index(at_40, name.index)
+    family, index = name.family, name.index
+    if family is not None and index is None:
+        if family.at_100 is not None:  # all grades have the slope of ISO VG 46
+            B = Walther.through((46.0, 40.0), (family.at_100, 100.0)).B
+            return Walther(log10(log10(at_40 + 0.7)) + B * log10(40.0 + zero_Celsius), B)
+        index = family.index
+    at_100 = GRADES[name.grade] if index is None else at_100_of_index(at_40, index)
     return Walther.through((at_40, 40.0), (at_100, 100.0))
 
 
@@ -159,7 +166,8 @@ def with_oil(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _with_grade(values: dict[str, Any], oil: str, heat: Any) -> None:
-    law, named = read_oil(oil), read_oil_name(oil).temperature
+    law, name = read_oil(oil), read_oil_name(oil)
+    named, family = name.temperature, name.family
     if named is not None:
         put(values, "temperature", named, f'oil = "{oil}"')
         heat = values["temperature"]
@@ -168,7 +176,8 @@ def _with_grade(values: dict[str, Any], oil: str, heat: Any) -> None:
     if not number(heat) or not -60.0 <= heat <= 200.0:
         return
     at_15 = values.get("oil_density")
-    rho = density(heat, at_15 if number(at_15) else DENSITY)
+    usual = family.density if family else DENSITY
+    rho = density(heat, at_15 if number(at_15) else usual)
     eta = law(heat) * rho * 1e-12
     if eta > THICKEST:
         raise ValueError(
@@ -177,4 +186,4 @@ def _with_grade(values: dict[str, Any], oil: str, heat: Any) -> None:
         )
     put(values, "viscosity", eta, f'oil = "{oil}" at {heat:g} degC ({1e9 * eta:.4g} mPa s)')
     if values.get("pressure_viscosity") is None and values.get("roelands") is None:
-        values["pressure_viscosity"] = barus(eta)
+        values["pressure_viscosity"] = (family.pressure_share if family else 1.0) * barus(eta)

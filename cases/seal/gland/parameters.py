@@ -44,6 +44,7 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
     names = (
         *("ring", "rod", "bore", "groove_diameter", "squeeze", "groove_depth", "fill", "gland"),
         *("backup", "compound", "shore_A", "fit", "oil", "oil_density", "roelands", "said"),
+        *("modulus_table", "modulus_rule", "swelling", "compression_set"),
     )
     headings: ClassVar = {
         "ring": (*_declared_keys(FreeSeal), *_declared_keys(SectionKeys), *MEASURES),

@@ -152,8 +152,9 @@ class Oil(ThinningKeys):
 
     oil: str | None = key(
         None,
-        "an oil by its grade or two viscosities, for viscosity and pressure_viscosity",
-        bounds='"ISO VG 46", "HLP 46", "HVLP 46", "46 cSt at 40 degC, 6.8 cSt at 100 degC"',
+        "a fluid by its grade or two viscosities, for viscosity and pressure_viscosity",
+        bounds='"ISO VG 46", "HLP 46", "HVLP 46", "HFC 46", "PAO 46", "46 cSt at 40 degC, 6.8 cSt '
+        'at 100 degC"',
     )
     temperature: float | None = key(
         None, "temperature of oil and rubber, where they depend on it", unit="degC", ge=-60, le=200
@@ -180,7 +181,7 @@ class Oil(ThinningKeys):
         None,
         "density of the oil at 15 degC",
         unit="kg/m3",
-        bounds="500 to 2000, left out = 870",
+        bounds="500 to 2000, left out = 870, or typical of a fluid that is no mineral oil",
         ge=500,
         le=2000,
     )
@@ -212,6 +213,23 @@ class FreeSeal(SectionKeys):
         unit="mm",
         gt=0,
         le=500,
+    )
+
+    swelling: float | None = key(
+        None,
+        "growth of the ring in its medium by volume, for its sizes and the modulus of its hardness",
+        unit="%",
+        bounds="-20 to 100, left out = none; only of a ring by its name",
+        ge=-20,
+        le=100,
+    )
+    compression_set: float | None = key(
+        None,
+        "part of the squeeze that the ring has lost for good (ISO 815)",
+        unit="%",
+        bounds="0 to 95, left out = none; only of a ring by its name",
+        ge=0,
+        le=95,
     )
 
     @property

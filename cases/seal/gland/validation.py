@@ -10,7 +10,6 @@ from softehl.cases.seal.gland.records import Discretisation, Gland, Solid
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.sections.section_keys import is_mesh
 from softehl.cases.seal.gland.tolerances import read_tolerances
-from softehl.cases.seal.gland.trade.rubber_names import GLASS
 
 if TYPE_CHECKING:
     from softehl.cases.seal.gland.parameters import Seal
@@ -50,19 +49,6 @@ def _rubber_has_an_element(p: Solid) -> None:
                 f'material = "{rubber.material}" and solid = "{p.solid}": other elements '
                 'than "taylor_mean" have "mooney-rivlin" and "neo-hooke" alone; leave solid out'
             )
-
-
-def _rubber_is_no_glass(p: Solid, heat: float | None) -> None:
-    for rubber in (p, *p.materials.values()):
-        polymer = rubber.polymer
-        if heat is None or polymer is None or heat >= GLASS.get(polymer, heat):
-            continue
-        raise ValueError(
-            f"temperature = {heat:g} degC: {rubber.compound} is a glass below about "
-            f"{GLASS[polymer]:g} degC and its hardness says nothing of it; for a compound for the "
-            'cold give its modulus at this temperature, as in material = "neo-hooke" and mu = "15 '
-            'MPa"'
-        )
 
 
 def _sensitivity_has_a_meaning(p: Seal) -> None:
@@ -217,7 +203,6 @@ def _pressure_is_within_reach(p: Seal) -> None:
 _CHECKS = (
     _mesh_is_there,
     _rubber_has_an_element,
-    lambda p: _rubber_is_no_glass(p, p.temperature),
     _discretisation_is_rich_enough,
     _film_has_its_model,
     _air_side_is_closed_or_open,

@@ -17,7 +17,8 @@ LEFT_OUT = (
     "Fillets of the groove: its corners are sharp.",
     "The extrusion gap, unless the case opens it: the wall of the air side reaches the rod.",
     "Friction of the seal on its housing, unless the case has a coefficient.",
-    "Wear, swelling and ageing: dimensions and moduli are those given.",
+    "Wear and ageing: dimensions and moduli are those given. Swelling and compression set, unless "
+    "the case has keys for them.",
 )
 """A report ends with these."""
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from softehl.cases.seal.gland.trade.rubber_names import SHORE_D
+
 
 def youngs_modulus(shore_A: float, polymer: str | None = None) -> float:
     """Young's modulus from a hardness Shore A, MPa; polymer: "PU" has a rule of its own.
@@ -17,8 +19,9 @@ def youngs_modulus(shore_A: float, polymer: str | None = None) -> float:
     """
     if polymer == "PU":
         hard = shore_A
-        if shore_A > 80.0:  # both scales in the conversion chart of ASTM D2240
-            hard = 50.0 + np.interp(shore_A, (80, 85, 90, 95, 100), (29, 33, 39, 46, 58))
+        if shore_A > 80.0:
+            shore_d, chart = zip(*SHORE_D, strict=True)
+            hard = 50.0 + float(np.interp(shore_A, chart, shore_d))
         return float(10.0 ** (0.0235 * hard - 0.6403))
     return 0.0981 * (56.0 + 7.62336 * shore_A) / (0.137505 * (254.0 - 2.54 * shore_A))
 

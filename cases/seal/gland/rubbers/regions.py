@@ -61,7 +61,7 @@ def _region(name: str, table: object) -> Region:
         table = {"material": table}
     if not isinstance(table, Mapping) or not table:
         raise ValueError(f"materials.{name} = {table}: allowed is {MATERIALS}")
-    for key in ("fit", "ogden_terms"):
+    for key in ("fit", "ogden_terms", "glass_transition", "modulus_rule", "modulus_table"):
         if table.get(key) not in (None, 3):
             raise ValueError(f"materials.{name}: {key} is for the whole section; give moduli")
     if name == CAP and set(table) <= set(PRESETS["ptfe"]) - {"material"}:

@@ -11,11 +11,17 @@ from pathlib import Path
 from typing import Any
 
 from softehl.cases.seal.gland.key_values import number, put, value_text
+from softehl.cases.seal.gland.rubbers.conditions import (
+    LEAST,
+    modulus_at,
+    modulus_of_table,
+    swollen_modulus,
+)
 from softehl.cases.seal.gland.rubbers.hardness import shore_range, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import KEYS, MATERIALS, Material, shear_modulus
 from softehl.cases.seal.gland.rubbers.rubber_fit import fit, read_data
 from softehl.cases.seal.gland.trade.normalise_text import refused
-from softehl.cases.seal.gland.trade.rubber_names import read_rubber
+from softehl.cases.seal.gland.trade.rubber_names import GLASS, read_rubber
 
 PAPER = {"mu_1": 3.04, "mu_2": 0.62}
 """Moduli of Table 1 of the paper, MPa."""
@@ -29,17 +35,26 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
     """
     values = dict(given)
     polymer = _with_hardness(values)
+    given_by = {
+        k: values[k] for k in ("shore_A", "modulus_table", "fit") if values.get(k) is not None
+    }
+    if len(given_by) > 1:
+        (one, first), (other, second) = [*given_by.items()][:2]
+        raise ValueError(
+            f"{one} = {first!r} and {other} = {second!r} contradict: leave one of them out"
+        )
     shore, table = values.get("shore_A"), values.get("fit")
-    if shore is not None and table is not None:
-        raise ValueError(f"shore_A = {shore} and fit = {table!r} contradict: leave one of them out")
     if values.get("material") is None:
-        values["material"] = "mooney-rivlin" if shore is None else "neo-hooke"
+        one_modulus = shore is not None or values.get("modulus_table") is not None
+        values["material"] = "neo-hooke" if one_modulus else "mooney-rivlin"
     material = MATERIALS.get(values["material"]) if isinstance(values["material"], str) else None
     if material is None:
         return values
     _require_own(values, material)
     if number(shore):
         _with_shore(values, material, polymer)
+    if isinstance(values.get("modulus_table"), str):
+        _with_table(values, material, Path(values["modulus_table"]))
     if isinstance(table, str):
         _with_fit(values, material, Path(table))
     if values["material"] == "mooney-rivlin":
@@ -78,15 +93,18 @@ def _with_hardness(values: dict[str, Any]) -> str | None:
 
 def _require_own(values: dict[str, Any], material: Material) -> None:
     """No key of another material; those that have a default elsewhere are emptied."""
-    source, shore = f'material = "{values["material"]}"', values.get("shore_A")
-    if shore is not None:
+    source = f'material = "{values["material"]}"'
+    for key in ("shore_A", "modulus_table"):
+        if (given := values.get(key)) is None:
+            continue
         if "mu" not in material.keys:
             names = ", ".join(f'"{n}"' for n, m in MATERIALS.items() if "mu" in m.keys)
+            one = "a hardness" if key == "shore_A" else "it"
             raise ValueError(
-                f"shore_A = {shore} and {source} contradict: a hardness gives one modulus; "
+                f"{key} = {given} and {source} contradict: {one} gives one modulus; "
                 f"allowed are {names}"
             )
-        source = f"shore_A = {shore} ({source})"
+        source = f"{key} = {given} ({source})"
     for key in KEYS:
         if key in material.keys:
             continue
@@ -100,10 +118,38 @@ def _require_own(values: dict[str, Any], material: Material) -> None:
 
 
 def _with_shore(values: dict[str, Any], material: Material, polymer: str | None) -> None:
+    """The modulus of a hardness, at the temperature of the seal and as far as it has swollen."""
     mu = youngs_modulus(float(values["shore_A"]), polymer) / 3.0
+    heat, rule, swelling = (values.get(k) for k in ("temperature", "modulus_rule", "swelling"))
+    glass = values.get("glass_transition")
+    if glass is None:
+        glass = GLASS.get(polymer or "")
+    if number(heat) and (glass is None or number(glass)):
+        if rule != "constant" and glass is not None and heat < glass + LEAST:
+            typical = ", typical of its polymer" if values.get("glass_transition") is None else ""
+            raise ValueError(
+                f"temperature = {heat:g} degC: {values.get('compound') or 'the rubber'} becomes a "
+                f"glass at {glass:g} degC{typical}, and its hardness says nothing of it below "
+                f"{glass + LEAST:g} degC; for a compound for the cold give its glass_transition, "
+                'or its modulus at this temperature, as in material = "neo-hooke" and mu = "15 MPa"'
+            )
+        mu = modulus_at(mu, heat, glass, rule)
+    if number(swelling) and swelling > -100.0:
+        mu *= swollen_modulus(swelling)
+    _put_modulus(values, material, mu, f"shore_A = {values['shore_A']:g}")
+
+
+def _with_table(values: dict[str, Any], material: Material, path: Path) -> None:
+    """The modulus of a table at the temperature of the seal."""
+    if not number(heat := values.get("temperature")):
+        raise ValueError(f'modulus_table = "{path}" needs the temperature of the seal')
+    _put_modulus(values, material, modulus_of_table(path, heat), f'modulus_table = "{path}"')
+
+
+def _put_modulus(values: dict[str, Any], material: Material, mu: float, source: str) -> None:
+    """The key mu of a material by its shear modulus, MPa."""
     if all(number(values.get(key)) for key in material.keys if key != "mu"):
-        unit = shear_modulus(material, {**values, "mu": 1.0})
-        put(values, "mu", mu / unit, f"shore_A = {values['shore_A']:g}")
+        put(values, "mu", mu / shear_modulus(material, {**values, "mu": 1.0}), source)
 
 
 def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:

@@ -9,9 +9,10 @@ from pydantic import Field, model_validator
 from softehl.cases.harness.parameters import Number, Parameters, key
 from softehl.cases.seal.gland.key_values import value_text
 from softehl.cases.seal.gland.rubbers import materials
+from softehl.cases.seal.gland.rubbers.conditions import Rule
 from softehl.cases.seal.gland.rubbers.rubber import PAPER
 from softehl.cases.seal.gland.trade.parse_terms import rubber_named
-from softehl.cases.seal.gland.trade.rubber_names import read_rubber
+from softehl.cases.seal.gland.trade.rubber_names import GLASS, read_rubber
 
 Terms = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3, strict=False)]
 
@@ -47,7 +48,7 @@ class Rubber(Parameters):
     compound: str | None = key(
         None,
         "a rubber by polymer and hardness, for shore_A",
-        bounds='"NBR 70", "FKM 75", "EPDM 80", "PU 95", also as material',
+        bounds='"NBR 70", "FKM 75 IRHD", "EPDM 80", "PU 46 Shore D", also as material',
     )
     shore_A: float | None = key(
         None,
@@ -63,6 +64,26 @@ class Rubber(Parameters):
         file=True,
     )
     ogden_terms: int = key(3, "terms of an Ogden fit", bounds="1, 2 or 3", ge=1, le=3)
+    glass_transition: float | None = key(
+        None,
+        "glass transition of the rubber, for its modulus in the cold",
+        unit="degC",
+        bounds="-150 to 60, left out = typical of its polymer (docs/materials.md)",
+        ge=-150,
+        le=60,
+    )
+    modulus_rule: Rule | None = key(
+        None,
+        "modulus of a hardness over temperature",
+        bounds='"wlf" (stiffer in the cold), "entropic" (also in proportion to the absolute '
+        'temperature) or "constant", left out = wlf',
+    )
+    modulus_table: str | None = key(
+        None,
+        "shear modulus over temperature, measured",
+        bounds="a CSV file with the columns temperature_degC, shear_modulus_MPa",
+        file=True,
+    )
     bulk_modulus: float = key(500.0, "bulk modulus kappa", unit="MPa", gt=0, le=1e5)
 
     @classmethod
@@ -75,6 +96,13 @@ class Rubber(Parameters):
         """Of the rubber that is named."""
         rubber = read_rubber("compound", self.compound) if self.compound else None
         return rubber.polymer if rubber else None
+
+    @property
+    def glass(self) -> float | None:
+        """Its glass transition, that of the key or typical of its polymer, degC."""
+        if self.glass_transition is not None:
+            return self.glass_transition
+        return GLASS.get(self.polymer or "")
 
     @property
     def energy(self) -> str:

@@ -10,6 +10,49 @@ from softehl.cases.harness.units import read_quantity
 from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.normalise_text import NUMBER, form, plain, refused
 
+
+@dataclass(frozen=True)
+class Family:
+    """Fluids of ISO 6743-4 and ISO 15380 that are no mineral oils, with values typical of them.
+
+    density: at 15 degC, kg/m^3. index: viscosity index, None where at_100 has the viscosity at 100
+    degC of the grade ISO VG 46. pressure_share: pressure-viscosity coefficient over that of a
+    mineral oil of the same viscosity, known to a third. highest: temperature of use, degC. attacks:
+    polymers that do not resist it.
+    """
+
+    name: str
+    kind: str
+    density: float
+    index: float | None
+    at_100: float | None
+    pressure_share: float
+    highest: float | None
+    attacks: tuple[str, ...]
+
+
+_FAMILY_ROWS = rows("oil_families.csv")
+
+
+def _or_none(text: str) -> float | None:
+    return float(text) if text else None
+
+
+FAMILIES = {
+    row["family"]: Family(
+        row["family"],
+        row["kind"],
+        float(row["density"]),
+        _or_none(row["index"]),
+        _or_none(row["at_100_of_46"]),
+        float(row["pressure_share"]),
+        _or_none(row["to_degC"]),
+        tuple(row["attacks"].split()),
+    )
+    for row in _FAMILY_ROWS
+}
+"""Fluids by their letters."""
+
 IMPROVED = 140.0
 """Least viscosity index of HVLP oils, DIN 51524-3."""
 
@@ -37,7 +80,8 @@ class OilName:
     """An oil as its name says.  grade: of ISO 3448, or points: two viscosities, each (cSt, degC).
 
     index: viscosity index, None where it is that of a mineral oil. temperature: degC, None where
-    the name does not say it. improved: whether the index is the least of HVLP oils.
+    the name does not say it. improved: whether the index is the least of HVLP oils. family: None of
+    a mineral oil, and of one by two viscosities.
     """
 
     grade: int | None = None
@@ -45,24 +89,27 @@ class OilName:
     points: tuple[tuple[float, float], ...] = ()
     temperature: float | None = None
     improved: bool = False
+    family: Family | None = None
 
 
-_STANDARD = form(r"(?:DIN ?51524(?:-\d)?|ISO ?(?:6743|11158)(?:-\d)?|JIS)[ ,:]*")
+_STANDARD = form(r"(?:DIN ?51524(?:-\d)?|ISO ?(?:6743|11158|12922|15380)(?:-\d)?|JIS)[ ,:]*")
 _MINERAL = r"HLP-?D|HLP|HL|(?:L-)?HM|CLP|CL|HH|AW|hydraulic oil"
 _IMPROVED = r"HVLP-?D|HVLP"
+_FAMILY = "|".join("|".join((row["family"], row["also"])) for row in _FAMILY_ROWS)
 _ISO = r"ISO[ -]?VG|VG|ISO"
 _DEGREE = r"(?:deg ?C|° ?C|C)"
 _WARM = rf"(?P<at>-?{NUMBER}) ?(?:{_DEGREE}|(?P<f>(?:deg ?|° ?)?F))"
 _AT = rf"(?:[ ,]*(?:at|@|/|bei)? ?[(]?{_WARM}[)]?)?"
 _GRADE = form(
-    rf"(?P<plain>ISO[ -]?)?(?:(?P<improved>{_IMPROVED})|(?P<mineral>{_MINERAL}))?[ -]*"
+    rf"(?P<plain>ISO[ -]?)?(?:(?P<improved>{_IMPROVED})|(?P<mineral>{_MINERAL})"
+    rf"|(?P<family>{_FAMILY}))?[ -]*"
     rf"(?P<iso>{_ISO})?[ -]*"
     rf"(?P<grade>\d{{1,5}})(?:[ ,(]*VI ?=? ?(?P<index>{NUMBER})\)?)?{_AT}"
 )
 _POINT = form(rf"(?P<nu>{NUMBER}) ?(?:cSt|mm\^?2/s) ?(?:at|@|/|bei)? ?{_WARM}")
 _GREASE = form(r".*\b(?:grease|NLGI|Fett|lithium soap|molykote)\b.*")
 _OTHER = form(
-    r"(?:ISO )?(?P<kind>HV|HFA[ES]?|HFB|HFC|HFD[RU]?|HEES|HETG|HEPG|HEPR|ATF|PAO|DOT ?\d|SAE)\b.*"
+    r"(?:ISO )?(?P<kind>HV|HFA[ES]?|HFB|HFC|HFD-?[RU]?|HEES|HETG|HEPG|HEPR|ATF|PAO|DOT ?\d|SAE)\b.*"
     r"|(?P<word>water|air|emulsion|skydrol).*"
 )
 
@@ -71,7 +118,7 @@ def read_oil_name(name: str) -> OilName:
     """The oil of a name.  Raises NotUnderstoodError."""
     text = _STANDARD.sub("", plain(name))
     match = _GRADE.fullmatch(text)
-    if match and any(match[k] for k in ("plain", "improved", "mineral", "iso")):
+    if match and any(match[k] for k in ("plain", "improved", "mineral", "iso", "family")):
         return _of_grade(match)
     points = [_POINT.fullmatch(part.strip()) for part in re.split(r"[;,]| and ", text)]
     if len(points) == 2 and all(points):
@@ -100,7 +147,14 @@ def _of_grade(match: re.Match[str]) -> OilName:
     improved = bool(match["improved"] and not match["index"])
     index = float(match["index"]) if match["index"] else IMPROVED if improved else None
     at = _celsius(match) if match["at"] else None
-    return OilName(int(match["grade"]), index, temperature=at, improved=improved)
+    family = None
+    if said := match["family"]:
+        family = next(
+            FAMILIES[row["family"]]
+            for row in _FAMILY_ROWS
+            if re.fullmatch(f"{row['family']}|{row['also']}", said, re.IGNORECASE)
+        )
+    return OilName(int(match["grade"]), index, temperature=at, improved=improved, family=family)
 
 
 def _unknown(name: str, text: str) -> Exception:
@@ -118,6 +172,8 @@ def _unknown(name: str, text: str) -> Exception:
         kind = match["kind"] or match["word"]
         if kind.upper() == "HV":
             return refused("oil", name, "does not say its viscosity index", *forms[2:])
+        if kind.upper().replace("-", "") in FAMILIES:
+            return refused("oil", name, "needs its grade", f"{kind} 46", TWO)
         why = (
             "does not say its viscosity: take two values from its data sheet, with oil_density and "
             "pressure_viscosity"

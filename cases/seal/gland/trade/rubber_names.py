@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import pairwise
 
 from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.normalise_text import NUMBER, form, number_text, plain, refused
@@ -19,17 +20,15 @@ RANGES = {
 }
 """Polymer -> temperatures at which a common chart of makers lets it be used for long, degC."""
 
-GLASS = {
-    row["polymer"]: min(float(row["glass_degC"]), float(row["from_degC"] or row["glass_degC"]))
-    for row in _TABLE
-    if row["glass_degC"]
-}
-"""Polymer -> temperature below which none of its common rubbers is one, degC.
+GLASS = {row["polymer"]: float(row["glass_degC"]) for row in _TABLE if row["glass_degC"]}
+"""Polymer -> glass transition that is typical of its common compounds, degC.
 
-The lowest glass transition of two tables (Encyclopaedia Britannica, "elastomer", table 1; C. A.
-Harper, Handbook of Plastics Technologies, 2006, table 4.2), or the lower end of the range if that
-is lower.
+It moves with the polymer: of NBR by the acrylonitrile, -50 degC at 18 % and -15 degC at 45 %; of
+FKM -30 degC and lower for grades with perfluorinated ethers.
 """
+
+SHORE_D = ((29.0, 80.0), (33.0, 85.0), (39.0, 90.0), (46.0, 95.0), (58.0, 100.0))
+"""Hardness Shore D and A, in the conversion chart of ASTM D2240."""
 
 _SPELT = {
     word: row["polymer"]
@@ -38,8 +37,8 @@ _SPELT = {
 }
 _POLYMER = rf"(?P<name>{'|'.join(sorted(_SPELT, key=len, reverse=True))})"
 _UNIT = (
-    r"(?:(?:°|deg)? ?(?:(?:sh(?:ore)?\.?)? ?-?(?P<scale>[AD])|sh(?:ore)?|IRHD|duro(?:meter)?"
-    r"|JIS[ -]?A|Hs)|°)"
+    r"(?:(?:°|deg)? ?(?:(?:sh(?:ore)?\.?)? ?-?(?P<scale>[AD])|sh(?:ore)?|(?P<irhd>IRHD)"
+    r"|duro(?:meter)?|JIS[ -]?A|Hs)|°)"
 )
 _SHORE = rf"(?P<shore>{NUMBER})(?: ?{_UNIT})?"
 _FORMS = (
@@ -56,15 +55,21 @@ _PLASTICS = form(r"(?:PTFE|Teflon|POM|PA ?6?|PEEK|UHMW-?PE)\b.*")
 
 @dataclass(frozen=True)
 class RubberName:
-    """Polymer, None where only the hardness is named, and hardness Shore A."""
+    """Polymer, None where only the hardness is named, and hardness Shore A.
+
+    said: the hardness on another scale, "70 IRHD" or "50 Shore D", that shore_A follows from.
+    """
 
     polymer: str | None
     shore_A: float
+    said: str = ""
 
     @property
     def text(self) -> str:
         """As it is written here."""
         shore = number_text(self.shore_A)
+        if self.said:
+            return f"{self.polymer} {self.said}" if self.polymer else self.said
         return f"{self.polymer} {shore}" if self.polymer else f"{shore} Shore A"
 
 
@@ -102,8 +107,23 @@ def _read(key: str, text: str, groups: dict[str, str | None]) -> RubberName:
         raise refused(key, text, "needs its hardness in Shore A", f"{polymer} {usual}")
     shore, scale = float(groups["shore"]), (groups.get("scale") or "A").upper()
     if scale == "D":
-        why = "is a hardness Shore D; write that in Shore A, or the shear modulus, mu"
-        raise refused(key, text, why, f"{polymer or 'PU'} 95")
+        return _of_shore_d(key, text, polymer, shore)
     if not 10.0 <= shore < 100.0:
         raise refused(key, text, "is no hardness Shore A", f"{polymer or 'NBR'} 70")
-    return RubberName(polymer, shore)
+    said = f"{number_text(shore)} IRHD" if groups.get("irhd") else ""
+    return RubberName(polymer, shore, said)
+
+
+def _of_shore_d(key: str, text: str, polymer: str | None, shore: float) -> RubberName:
+    """A hardness Shore D as one Shore A.  Raises NotUnderstoodError beyond the chart."""
+    low, high = SHORE_D[0][0], SHORE_D[-1][0]
+    if not low <= shore < high:
+        why = (
+            f"is beyond the conversion chart, {low:g} to {high:g} Shore D; write the shear "
+            "modulus, mu, or a hardness within it"
+        )
+        raise refused(key, text, why, f"{polymer or 'PU'} 46 Shore D")
+    below, above = next(pair for pair in pairwise(SHORE_D) if shore < pair[1][0])
+    part = (shore - below[0]) / (above[0] - below[0])
+    shore_a = round(below[1] + part * (above[1] - below[1]), 2)
+    return RubberName(polymer, shore_a, f"{number_text(shore)} Shore D")
