@@ -38,6 +38,7 @@ from softehl.runtime.definition.element_blocks import (
     form_of,
     geometry_of,
 )
+from softehl.runtime.definition.initial_values import add_initial_values
 from softehl.runtime.definition.kernel_loading import KernelOrigin, Source
 from softehl.runtime.definition.problem_definition import (
     Datum,
@@ -394,25 +395,58 @@ class Study:
             depth=depth,
         )
 
-    def start(self, where: Where | None = None, **values: Datum) -> None:
-        """Set initial values of unknowns; they are zero if left out.
+    def initial(
+        self, where: Where | None = None, *, block: str | None = None, **values: Datum
+    ) -> None:
+        """Set initial values of unknowns, and of history and other data of integration points.
 
         Parameters
         ----------
         where : str, callable, tuple of float or array of int, optional
-            Nodes, as in `fix`; all nodes if left out.
-        **values : float or callable
-            Unknown -> number, or function of coordinates (n, dim) that gives (n,). Of two values
-            for one node the later one counts.
+            Of unknowns: nodes, as in `fix`. Of data of points: a group of cells, or a predicate of
+            coordinates for the elements all of whose nodes it selects. Everywhere if left out.
+        block : str, optional
+            Block of the data of points; all blocks with such data if left out.
+        **values : float, array or callable
+            Name -> value. Unknown: a number, (n,) at the nodes, or a function of coordinates
+            (n, dim). Data of points (`Model.point_data`), such as a plastic strain or a prestress:
+            a number, an array by element, node or integration point of the block as in `add`, or a
+            function of coordinates. Of two values for one place the later one counts.
 
         Raises
         ------
         StudyError
-            A value is not finite, or has a wrong shape.
+            A value is not finite or has a wrong shape, or there is no such block or data.
         MeshError
-            The mesh has no such side or node.
+            The mesh has no such side, group or node.
+
+        Notes
+        -----
+        What is not set is zero, data of points are as `add` gives them. `solve`, `march`, `follow`,
+        `modes` and `buckling` begin with these values; `start=` of them, a result, has precedence
+        for unknowns and history.
         """
-        loads_and_supports.add_initial_values(self._definition, where, values)
+        add_initial_values(self._definition, where, block, values)
+
+    def start(self, where: Where | None = None, **values: Datum) -> None:
+        """Set initial values: an older name of `initial`.
+
+        Parameters
+        ----------
+        where : str, callable, tuple of float or array of int, optional
+            As of `initial`.
+        **values : float, array or callable
+            As of `initial`.
+
+        Raises
+        ------
+        StudyError
+            As of `initial`.
+        MeshError
+            As of `initial`.
+        """
+        named: dict[str, Any] = dict(values)
+        self.initial(where, **named)
 
     # analyses -----------------------------------------------------------------------------------
 

@@ -74,7 +74,7 @@ def _take_nodal(target: System, source: System, x: Array, values: Array) -> None
             node = int(unsaid.argmax())
             raise StudyError(
                 f"start: the result has no {name!r} at node {node} "
-                f"{place_text(target.mesh.points[node])}; say what it is: study.start({name}=...)"
+                f"{place_text(target.mesh.points[node])}; say what it is: study.initial({name}=...)"
             )
 
 

@@ -1,4 +1,4 @@
-"""Loads, pressures, springs, supports, ties and initial values that are added to a definition."""
+"""Loads, pressures, springs, supports and ties that are added to a definition."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import numpy as np
 from softehl.runtime.arrays import Integers
 from softehl.runtime.definition import argument_checks as read
 from softehl.runtime.definition.problem_definition import (
-    Datum,
-    InitialValues,
     Load,
     PrescribedValues,
     ProblemDefinition,
@@ -116,19 +114,6 @@ def add_ties(
     for name in names:
         pairs = np.stack([side_nodes, partners], axis=1)
         _add_force(definition, "tie", where, Tie(offset), pairs, (name,))
-
-
-def add_initial_values(
-    definition: ProblemDefinition, where: Where | None, values: Mapping[str, Datum]
-) -> None:
-    """Set initial values of unknowns; see `Study.start`."""
-    mesh = definition.mesh
-    read.require_unknowns("start()", values, "T=20")
-    everywhere = np.arange(len(mesh.points))
-    nodes = everywhere if where is None else read.nodes_of(mesh, where)
-    for name, value in values.items():
-        at_nodes = read.datum("start", name, value, mesh.points[nodes])
-        definition.start.append(InitialValues(name, nodes, at_nodes))
 
 
 def _add_force(

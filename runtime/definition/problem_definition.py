@@ -135,6 +135,7 @@ class InitialValues:
 class ProblemDefinition:
     """A boundary-value problem that is being written down, in the order of the script.
 
+    point_values: names of the data of points that `Study.initial` has set.
     axisymmetric: whether cells and sides are those of rings around the x axis.
     """
 
@@ -145,6 +146,7 @@ class ProblemDefinition:
     forces: list[Load] = field(default_factory=list)
     start: list[InitialValues] = field(default_factory=list)
     contacts: list[Any] = field(default_factory=list)
+    point_values: list[str] = field(default_factory=list)
 
     def copy(self) -> ProblemDefinition:
         """A copy, to which more can be added."""
@@ -156,7 +158,8 @@ class ProblemDefinition:
     @property
     def size(self) -> int:
         """Number of blocks, supports, loads and initial values; it only grows."""
-        return sum(map(len, (self.blocks, self.conditions, self.forces, self.start)))
+        counted = (self.blocks, self.conditions, self.forces, self.start, self.point_values)
+        return sum(map(len, counted))
 
     def prescribed(self, name: str) -> Integers:
         """Nodes at which an unknown is prescribed."""

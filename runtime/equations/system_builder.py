@@ -10,6 +10,7 @@ import numpy as np
 from softehl.log import warn
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.definition.element_blocks import facet_nodes
+from softehl.runtime.definition.initial_values import point_data_names
 from softehl.runtime.definition.problem_definition import (
     Block,
     Load,
@@ -163,11 +164,28 @@ def _at_start(definition: ProblemDefinition, numbering: Numbering) -> dict[str, 
     initial_values: dict[str, Array] = {}
     for start in definition.start:
         somewhere = definition.mesh.anywhere
-        context = f"start({start.name}=...)"
+        context = f"initial({start.name}=...)"
+        _require_in_time(definition, start.name, numbering, context)
         _require(start.name, start.nodes, numbering, context, somewhere=somewhere)
         values = initial_values.setdefault(start.name, np.full(len(definition.mesh.points), np.nan))
         values[start.nodes] = start.values
     return initial_values
+
+
+def _require_in_time(
+    definition: ProblemDefinition, name: str, numbering: Numbering, context: str
+) -> None:
+    """Raise StudyError for an initial value of data of points, or of no unknown at all."""
+    if name in numbering.nodal:
+        return
+    names = {n: b.name for b in definition.blocks.values() for n in point_data_names(b)}
+    if name in names:
+        raise StudyError(f"{context}: data of points of {names[name]!r}: add the block before")
+    allowed = [*numbering.nodal, *names]
+    raise StudyError(
+        f"{context}: no unknown {name!r}{did_you_mean(name, allowed)}; at nodes: "
+        f"{join_names(numbering.nodal)}; data of points: {join_names(names)}"
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -229,7 +229,7 @@ MISTAKES: list[tuple[str, Callable[[Any], object], str]] = [
     ("load of nothing", lambda s: s.load("left"), "load('left'): name an unknown"),
     ("spring of nothing", lambda s: s.spring("left"), "spring('left'): name an unknown"),
     ("tie of nothing", lambda s: s.tie("left", "right"), "tie('left', 'right'): name an unknown"),
-    ("start of nothing", lambda s: s.start("left"), "start(): name an unknown"),
+    ("start of nothing", lambda s: s.initial("left"), "initial(): name an unknown"),
     ("load of nan", lambda s: s.load("left", u_x=float("nan")), "u_x = nan: the number must be"),
     ("tie of nan", lambda s: s.tie("left", "right", "u_x", offset=float("inf")), "offset = inf"),
     ("complex", lambda s: s.fix("left", u_x=np.complex128(1 + 2j)), "a real number is needed"),
