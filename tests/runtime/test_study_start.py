@@ -103,7 +103,7 @@ def test_what_does_not_fit_is_refused() -> None:
     ((w,),) = m.nodal_unknowns("w")
     m.weak_form([(w - w**2, w)])
     other.add("follower", m.finish(), on="right")
-    with pytest.raises(StudyError, match=r"no 'w' at node 1 .*study\.start\(w=\.\.\.\)"):
+    with pytest.raises(StudyError, match=r"no 'w' at node 1 .*study\.initial\(w=\.\.\.\)"):
         other.solve(start=first)
     other.start(w=0.9)
     assert other.solve(start=first).at((1.0,))["w"] == pytest.approx(1.0)
