@@ -336,17 +336,26 @@ def keys(case: str) -> int:
 
 
 @click.command(
-    help="""Find the value of one key that changes a result of CASE by TARGET.
+    help="""Find the values of keys that bring a result of CASE to TARGET.
 
-    Example: `softehl design oring "friction -10%" --by rod_diameter`. Exact sensitivities give the
+    Example: `softehl design oring "friction -10%" --by rod_diameter`. Other targets: "friction
+    below 5 N", "h_star above 0.5 um", "leakage below 1 mm3 a cycle". Exact sensitivities give the
     value, and a nonlinear solve checks it. The state is that of the first speed, at outstroke
-    unless stroke = in. Exit code: 0 done, 2 bad input, or a target that cannot be met.
+    unless stroke = in; a cycle has both. Exit code: 0 done, 2 bad input, or a target that cannot be
+    met.
     """,
     context_settings={"ignore_unknown_options": True},  # a target that begins with a minus sign
 )
 @click.argument("case", metavar="CASE")
 @click.argument("target", metavar="TARGET", nargs=-1, required=True)
-@click.option("--by", "key", metavar="KEY", required=True, help="The key to change.")
+@click.option(
+    "--by",
+    "by",
+    metavar="KEY",
+    required=True,
+    multiple=True,
+    help="The key to change; several times for several keys.",
+)
 @click.option(
     "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="As in `softehl run`."
 )
@@ -358,9 +367,13 @@ def keys(case: str) -> int:
     help="Also write a page: curve of the design; results, gland and section before and after.",
 )
 def design(
-    case: str, target: tuple[str, ...], key: str, assignments: tuple[str, ...], page: Path | None
+    case: str,
+    target: tuple[str, ...],
+    by: tuple[str, ...],
+    assignments: tuple[str, ...],
+    page: Path | None,
 ) -> int:
-    """Find the value of a key."""
+    """Find the values of keys."""
     from softehl.cases.harness.case_file import read_case
     from softehl.cases.harness.progress import make_display
     from softehl.cases.harness.runner import DisplayObserver
@@ -376,7 +389,7 @@ def design(
             raise BadInput(f"--report {str(page)!r}: there is no folder {str(page.parent)!r}")
     with make_display(read.case.foreword(read.parameters), quiet=False) as display:
         observer = DisplayObserver(display, read.case)
-        found = design_case(read.parameters, " ".join(target), key, observer)
+        found = design_case(read.parameters, " ".join(target), by, observer)
     for line in design_lines(found):
         click.echo(line)
     if page is not None:

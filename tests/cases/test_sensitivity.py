@@ -30,6 +30,7 @@ from softehl.cases.seal.sensitivity.design import (
     NoDesignError,
     Target,
     designed,
+    joint_lever,
     settled,
 )
 from softehl.cases.seal.sensitivity.design import Film as DesignFilm
@@ -426,7 +427,7 @@ def held(p: Seal) -> Change:
 def steps(target: Target, solve: Callable[[Seal], FilmState | None]) -> list[DesignStep]:
     def with_mesh(p: Seal) -> DesignFilm | None:
         state = solve(p)
-        return (state, held(p)) if state else None
+        return DesignFilm.of(state, target.quantity, held(p)) if state else None
 
     return designed(P, target, BY, with_mesh)
 
@@ -470,9 +471,71 @@ def test_what_is_out_of_reach_is_said() -> None:
         steps(Target.of("friction -50%"), lambda p: power_law(p, slope=-0.01))
     with pytest.raises(NoDesignError, match="has the verdict under-resolved"):
         steps(Target.of("friction -5%"), lambda p: power_law(p, verdict="under-resolved"))
-    for wrong in ("friction", "colour -3%", "friction -100%", "friction 3"):
+    for wrong in ("friction", "colour -3%", "friction -100%", "friction 3", "friction below 5 mm"):
         with pytest.raises(NoDesignError, match="is not understood"):
             Target.of(wrong)
+
+
+TARGETS = {
+    "friction -10%": Target("friction", 0.9),
+    "friction below 5 N": Target("friction", None, 5.0, "below"),
+    "friction <= 0.005 kN": Target("friction", None, 5.0, "below"),
+    "h* above 500 nm": Target("h_star", None, 0.5, "above"),
+    "h_star >= 0.5": Target("h_star", None, 0.5, "above"),
+    "p_max = 20 bar": Target("p_max", None, 2.0, ""),
+    "leakage below 12 mm3/s": Target("leakage", None, 12.0, "below"),
+    "leakage below 1 mm3 a cycle": Target("cycle_leakage", None, 1.0, "below"),
+    "leakage < 0.001 cm\u00b3/cycle": Target("cycle_leakage", None, 1.0, "below"),
+    "cycle_leakage -20%": Target("cycle_leakage", 0.8),
+}
+
+
+def test_targets_are_changes_values_or_bounds() -> None:
+    for text, wanted in TARGETS.items():
+        found = Target.of(text)
+        assert (found.quantity, found.factor, found.side) == (
+            wanted.quantity,
+            wanted.factor,
+            wanted.side,
+        ), text
+        assert found.value == pytest.approx(wanted.value)
+
+
+def test_a_bound_is_passed_and_not_met_twice() -> None:
+    """Friction 5 N: below 6 N nothing changes; 4.8 N is passed by half a per cent in one step."""
+    assert len(steps(Target.of("friction below 6 N"), power_law)) == 1
+    found = steps(Target.of("friction below 4.8 N"), power_law)
+    assert len(found) == 2
+    assert found[-1].quantity == pytest.approx(0.995 * 4.8)
+    assert steps(Target.of("friction = 4.8 N"), power_law)[-1].quantity == pytest.approx(4.8)
+
+
+def test_several_keys_change_by_the_least_sum_of_squares() -> None:
+    """Friction d^-3 eta^2: a rod counts by the gland, 3.15 mm deep."""
+    film = DesignFilm(power_law(P), 5.0, {"rod_diameter": -3.0, "viscosity": 2.0})
+    levers = [Lever(name, name) for name in ("rod_diameter", "viscosity")]
+    gear = 0.5 * 50.0 / 3.15
+    assert levers[0].gear(P) == pytest.approx(gear)
+    depth = Lever("groove_depth", "housing_diameter")
+    assert depth.gear(P) == pytest.approx(28.15 / 3.15, rel=1e-4)
+    joint = joint_lever(P, levers, film)
+    assert joint.name == "viscosity"
+    share = (-3.0 / gear**2) / 2.0
+    assert joint.exponents == {"viscosity": 1.0, "rod_diameter": pytest.approx(share)}
+    keys = joint.keys_at(P, 1.02 * P.viscosity)
+    assert keys["rod_diameter"] == pytest.approx(50.0 * 1.02**share)
+    assert film.slope(joint) == pytest.approx(2.0 - 3.0 * share)
+
+
+def test_leakage_of_a_cycle_is_a_difference() -> None:
+    """3 mm3/s out and 2 back at 100 mm/s leave 1 mm3 of 100 mm; slopes 1 and 2 leave 3 - 4."""
+    shared: dict[str, Any] = {"sensitivity": {"leakage": {"viscosity": 1.0}}}
+    out = power_law(P, leak_rate_mm3_s=3.0, rod_speed_mm_s=100.0, **shared)
+    back = power_law(P, leak_rate_mm3_s=-2.0, rod_speed_mm_s=-100.0, **shared)
+    back = replace(back, sensitivity={"leakage": {"viscosity": 2.0}})
+    film = DesignFilm.of_cycle(out, back, 100.0)
+    assert film.value == pytest.approx(1.0)
+    assert film.slopes["viscosity"] == pytest.approx(3.0 * 1.0 - 2.0 * 2.0)
 
 
 def test_a_key_that_is_no_number_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
@@ -533,8 +596,8 @@ ONE = {"speeds": (400.0,), "stroke": "out", "error_estimate": False}
 def test_the_held_mesh_gives_what_the_run_did() -> None:
     held_film = HeldFilm.of(P.model_copy(update={**ONE, "density": 1}), Silent())
     assert held_film is not None
-    assert held_film.change("friction", "rod_diameter", 1.0) == pytest.approx(1.0, abs=1e-7)
-    changed = held_film.change("friction", "rod_diameter", 0.9995)
+    assert held_film.change("friction", {"rod_diameter": 1.0}, 1.0) == pytest.approx(1.0, abs=1e-7)
+    changed = held_film.change("friction", {"rod_diameter": 1.0}, 0.9995)
     assert changed is not None
     assert 0.95 < changed < 0.99
 
@@ -551,7 +614,7 @@ def test_a_held_film_follows_a_key_further_than_one_solve() -> None:
     assert at_once.iterations > held_film.newton.max_iterations
     before = quantities(held_film.case, held_film.x)[quantity].value
     after = quantities(moved, at_once.x)[quantity].value
-    changed = held_film.change(quantity, "rod_diameter", 0.997)
+    changed = held_film.change(quantity, {"rod_diameter": 1.0}, 0.997)
     assert changed == pytest.approx(after / before, rel=1e-7)
 
 

@@ -347,7 +347,7 @@ def _kind(p: Gland) -> tuple[str, bool]:
 
 
 def _typical(p: Seal, family: Family, keys_set: frozenset[str]) -> Iterator[str]:
-    """What was taken from the family of a fluid."""
+    """Values taken from the family of a fluid."""
     texts = []
     if "oil_density" not in keys_set:
         texts.append(f"the density {family.density:g} kg/m3 at 15 degC")

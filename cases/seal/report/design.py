@@ -17,15 +17,16 @@ from softehl.cases.seal.report import style
 from softehl.cases.seal.report.parts import PRESSURES, gland
 from softehl.cases.seal.report.pictures import pictures_of
 from softehl.cases.seal.report.section import View, section_figure
-from softehl.cases.seal.sensitivity.design import Design, slope_of, value_of
+from softehl.cases.seal.sensitivity.design import CYCLE, Design, slope_of, value_of
 from softehl.cases.seal.sensitivity.quantities import CALLED
 from softehl.cases.seal.states.state import FilmRow
 
 
 def design_title(design: Design, run: str) -> str:
     """The seal, the key and the target; run: the title of a run of the seal."""
-    change = f"{design.target.percent:+g}\N{NO-BREAK SPACE}%"
-    return f"{run.partition(': ')[0]}: {design.by.title} for {design.target.title} {change}"
+    wanted = design.target.wanted.replace(" %", "\N{NO-BREAK SPACE}%")
+    keys = " and ".join(lever.title for lever, _, _ in design.moved)
+    return f"{run.partition(': ')[0]}: {keys} for {design.target.title} {wanted}"
 
 
 def design_parts(design: Design, case: AnyCase) -> list[Part]:
@@ -56,19 +57,31 @@ def _summary(design: Design) -> Part:
         lines=[
             f"{by.title} {after:.5g}{unit} instead of {previous:.5g}{unit}: "
             f"{target.title} {last.quantity:.4g} {target.unit} instead of {first.quantity:.4g} "
-            f"{target.unit}, {design.change:+.2f} % (wanted {target.percent:+g} %)",
+            f"{target.unit}, {design.change:+.2f} % (wanted {target.wanted})",
+            *(
+                f"and {lever.title} {later:.5g} {lever.unit} instead of {earlier:.5g} {lever.unit}"
+                for lever, earlier, later in design.moved[1:]
+            ),
             _rate(design),
-            f"this is the {style.STROKES[p.stroke]} at {p.speeds[0]:g} mm/s and "
+            f"this is {_what(design)} at {p.speeds[0]:g} mm/s and "
             f"{p.sealed_pressure:g} MPa; softehl run with {by.name} = {after:.5g} shows "
             "both strokes and other speeds",
         ],
     )
 
 
+def _what(design: Design) -> str:
+    """The stroke of a design, or its cycle."""
+    if design.target.quantity == CYCLE:
+        return f"a cycle of {design.parameters.travel:g} mm out and back"
+    return f"the {style.STROKES[design.parameters.stroke]}"
+
+
 def _rate(design: Design) -> str:
     """The change of the quantity with a step of the key that a workshop thinks in."""
     by, target, value, step_size = design.by, design.target, design.steps[-1].value, 1e-6
-    measure, slope = design.measure(value), slope_of(design.films[-1][1], target.quantity, by.key)
+    measure = design.measure(value)
+    slope = next(step.slope for step in reversed(design.steps) if step.state)
     step = {"mm": 0.01, "%": 1.0}.get(by.unit, 0.01 * abs(measure))
     percent = (
         100.0 * slope * step_size * step / (design.measure(value * (1.0 + step_size)) - measure)
@@ -102,10 +115,10 @@ def _curve(design: Design) -> Part:
 
 def _draw(panel: Any, design: Design) -> None:
     first, values = design.steps[0], [step.value for step in design.steps]
-    slope = slope_of(design.films[0][1], design.target.quantity, design.by.key)
+    slope = first.slope
     between = np.linspace(min(values), max(values), 41)
     predicted = first.quantity * (between / first.value) ** slope
-    colour, target = style.COLOURS["out"], design.target.factor * first.quantity
+    colour, target = style.COLOURS["out"], design.target.goal(first.quantity)
     along = [design.measure(value) for value in between.tolist()]
     panel.line(along, predicted, color=colour, legend_label="first prediction")
     dashes: dict[str, Any] = {"color": style.COLOURS["in"], "line_dash": "dashed"}
@@ -123,8 +136,11 @@ def _both(design: Design) -> Part:
     ratio, rows = design.steps[-1].value / at, []
     for name, (title, unit) in CALLED.items():
         previous = value_of(first, name)
-        after = value_of(last, name) * ratio ** slope_of(last, name, design.by.key)
+        after = value_of(last, name) * ratio ** slope_of(last, name, design.by)
         rows.append((title, previous, after, f"{100.0 * (after / previous - 1.0):+.3g} %", unit))
+    if (target := design.target).quantity == CYCLE:
+        before, later = design.steps[0].quantity, design.steps[-1].quantity
+        rows.append((target.title, before, later, f"{design.change:+.3g} %", target.unit))
     header = ("", "before", "after", "change", "unit")
     text = "Also what was not asked for changes; leakage of the stroke is not that of a cycle."
     return Part("Before and after", text, tables=[Table("Results of this film", header, rows)])

@@ -1,28 +1,31 @@
-"""Design: the value of one key that gives a quantity of a film its wanted change.
+"""Design: values of one or several keys that bring a quantity of a film to a target.
 
 Log-linear steps by exact sensitivities, each followed by a nonlinear solve on a mesh of its own;
-near the target the mesh is frozen, so that the steps settle.
+near a target that is an equation the mesh is frozen, so that the steps settle. Several keys change
+by the least sum of squares of their relative changes.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import ValidationError
 
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.observer import Observer
 from softehl.cases.harness.parameters import keys_of
+from softehl.cases.harness.units import read_quantity
 from softehl.cases.seal.gland.fit_geometry import DIAMETERS
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records import OF_PISTON
 from softehl.cases.seal.gland.sensitivity_keys import BASES, NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.sensitivity.frozen_mesh_map import FilmCase
-from softehl.cases.seal.sensitivity.quantities import CALLED, QUANTITIES, quantities
+from softehl.cases.seal.sensitivity.quantities import CALLED, quantities
 from softehl.cases.seal.sensitivity.sensitivity import differentiation
 from softehl.cases.seal.solve.driver import DryContact, Judge, verdict_of_contact
 from softehl.cases.seal.solve.film_solver import NoFilm
@@ -44,7 +47,29 @@ SETTLED = 1e-4
 STEPS = 6
 """Nonlinear solves after the first."""
 
-_TARGET = re.compile(r"(?P<name>\w+)\s*=?\s*(?P<change>[-+]\d+(\.\d*)?)\s*%")
+CYCLE = "cycle_leakage"
+"""Net leakage of a cycle out and back, which has films of both strokes."""
+
+TARGETS = {**CALLED, CYCLE: ("leakage of a cycle", "mm3")}
+"""Name of a quantity that may be a target -> what a reader calls it, and its unit."""
+
+_CHANGE = re.compile(r"(?P<name>\w+)\s*=?\s*(?P<change>[-+]\d+(\.\d*)?)\s*%")
+_SIDES = {
+    "below": r"below|under|at most|less than|<=?|\u2264",
+    "above": r"above|over|at least|more than|>=?|\u2265",
+    "": r"=|to",
+}
+_VALUE = re.compile(
+    rf"(?P<name>\w+)\s*(?:is )?(?P<side>{'|'.join(_SIDES.values())})\s*"
+    r"(?P<value>\d+(?:\.\d*)?(?:e-?\d+)?)\s*(?P<unit>[^\d\s].*)?"
+)
+_PER_CYCLE = re.compile(r"\s*(?:/|a |per |in a )\s*cycle$")
+_UNITS = {
+    "N": {"": 1.0, "N": 1.0, "kN": 1e3, "mN": 1e-3, "lbf": 4.4482216152605},
+    "mm3/s": {"": 1.0, "mm3/s": 1.0, "mm3/min": 1.0 / 60.0, "ml/h": 1.0 / 3.6},
+    "mm3": {"": 1.0, "mm3": 1.0, "ml": 1e3, "cm3": 1e3},
+}
+"""Unit of a quantity that has none in `harness.units` -> units that it is read in."""
 
 
 class NoDesignError(BadInput):
@@ -53,37 +78,92 @@ class NoDesignError(BadInput):
 
 @dataclass(frozen=True)
 class Target:
-    """A quantity and the factor that it is to change by."""
+    """Target of a quantity: a factor of its first value, a value, or a bound.
+
+    side: "below" or "above" of a bound, else empty.
+    """
 
     quantity: str
-    factor: float
-
-    @property
-    def percent(self) -> float:
-        """The change in per cent."""
-        return round(100.0 * (self.factor - 1.0), 9)
+    factor: float | None = None
+    value: float = 0.0
+    side: Literal["below", "above", ""] = ""
 
     @classmethod
     def of(cls, text: str) -> Target:
-        """From "friction -10 %".  Raises NoDesignError."""
-        match = _TARGET.fullmatch(text.strip().replace("h*", "h_star"))
-        if not match or match["name"] not in QUANTITIES or float(match["change"]) <= -100.0:
-            hint = did_you_mean(match["name"], QUANTITIES) if match else ""
-            raise NoDesignError(
-                f'the target "{text}" is not understood{hint}; allowed: a change in per cent of '
-                f'{", ".join(QUANTITIES)}, as in "friction -10%"'
-            )
-        return cls(match["name"], 1.0 + 0.01 * float(match["change"]))
+        """From "friction -10 %" or "friction below 5 N".  Raises NoDesignError."""
+        plain = text.strip().replace("h*", "h_star").replace("\u00b3", "3")
+        match = _CHANGE.fullmatch(plain)
+        if match and match["name"] in TARGETS and float(match["change"]) > -100.0:
+            return cls(match["name"], 1.0 + 0.01 * float(match["change"]))
+        valued = _VALUE.fullmatch(plain)
+        if valued and (found := cls._of_value(valued)):
+            return found
+        match = match or valued
+        hint = did_you_mean(match["name"], TARGETS) if match else ""
+        raise NoDesignError(
+            f'the target "{text}" is not understood{hint}; allowed: {", ".join(TARGETS)} with a '
+            'change in per cent, a value or a bound, as in "friction -10%", "friction below 5 N" '
+            'and "leakage below 1 mm3 a cycle"'
+        )
+
+    @classmethod
+    def _of_value(cls, match: re.Match[str]) -> Target | None:
+        """A value or a bound; None for an unknown quantity or unit."""
+        name, unit_text = match["name"], (match["unit"] or "").strip()
+        per_cycle = _PER_CYCLE.sub("", unit_text)
+        if name == "leakage" and per_cycle != unit_text:
+            name = CYCLE
+        if name not in TARGETS:
+            return None
+        unit_text = per_cycle if name == CYCLE else unit_text
+        unit, number = TARGETS[name][1], float(match["value"])
+        if unit in _UNITS:
+            if unit_text not in _UNITS[unit]:
+                return None
+            value = number * _UNITS[unit][unit_text]
+        else:
+            try:
+                value = read_quantity(f"{number:g} {unit_text or unit}", unit)
+            except ValueError:
+                return None
+        if not value > 0.0:
+            return None
+        side: Literal["below", "above", ""] = ""
+        if re.fullmatch(_SIDES["below"], match["side"]):
+            side = "below"
+        elif re.fullmatch(_SIDES["above"], match["side"]):
+            side = "above"
+        return cls(name, None, value, side)
+
+    def goal(self, first: float) -> float:
+        """The value or the bound, from a first value."""
+        return self.value if self.factor is None else self.factor * first
+
+    def aim(self, first: float) -> float:
+        """The value to go for from a first one: a bound is passed by half the tolerance."""
+        inside = {"below": -0.5, "above": 0.5, "": 0.0}[self.side] * TOLERANCE
+        return self.goal(first) * (1.0 + inside)
+
+    def within(self, value: float) -> bool:
+        """True if a value is on the right side of a bound; False without one."""
+        return {"below": value <= self.value, "above": value >= self.value}.get(self.side, False)
+
+    @property
+    def wanted(self) -> str:
+        """Change, value or bound in words."""
+        if self.factor is not None:
+            return f"{round(100.0 * (self.factor - 1.0), 9):+g} %"
+        return f"{self.side} {self.value:.5g} {self.unit}".strip()
 
     @property
     def title(self) -> str:
         """Name of the quantity for readers."""
-        return CALLED[self.quantity][0]
+        return TARGETS[self.quantity][0]
 
     @property
     def unit(self) -> str:
         """Of the quantity."""
-        return CALLED[self.quantity][1]
+        return TARGETS[self.quantity][1]
 
     def value_text(self, value: float) -> str:
         """A value of the quantity as it is typed."""
@@ -92,10 +172,37 @@ class Target:
 
 @dataclass(frozen=True)
 class Lever:
-    """A key or a measure of the gland that a user changes, by its name, and the key behind it."""
+    """A key or a measure of the gland that a user changes, by its name, and the key behind it.
+
+    others: levers that change with it, each with the log change of its key for one of this key.
+    """
 
     name: str
     key: str
+    others: tuple[tuple[Lever, float], ...] = ()
+
+    @property
+    def exponents(self) -> dict[str, float]:
+        """Each key that changes, and its log change for one of the first."""
+        return {self.key: 1.0, **{lever.key: share for lever, share in self.others}}
+
+    def keys_at(self, p: Seal, value: float) -> dict[str, float]:
+        """All keys, where that of this lever has a value; p: the case of the first step."""
+        factor = value / float(getattr(p, self.key))
+        keys = {k: float(getattr(p, k)) * factor**share for k, share in self.exponents.items()}
+        return {**keys, self.key: value}
+
+    def gear(self, p: Seal) -> float:
+        """Log change of the value for one of the key: not 1 of a measure of the gland.
+
+        Rod and housing count by what they change of the depth of the gland: 1 % of a diameter is
+        much more than 1 % of a viscosity.
+        """
+        if self.key in OF_PISTON and self.name not in BASES:
+            return abs(float(getattr(p, self.key))) / (2.0 * p.depth)
+        step = 1e-6
+        moved = p.model_copy(update={self.key: float(getattr(p, self.key)) * (1.0 + step)})
+        return math.log(abs(self.value(moved) / self.value(p))) / math.log1p(step)
 
     def value(self, p: Seal) -> float:
         """Its value as a user gives it: of a piston seal, too, a diameter is not negative."""
@@ -125,12 +232,14 @@ class Lever:
 class DesignStep:
     """A value of the key, and the quantity there by a nonlinear solve.
 
-    state: the film; None on a mesh that is held, where only the quantity is known.
+    state: the film; None on a mesh that is held, where only the quantity is known. slope: d log
+    quantity / d log key, where the film is known.
     """
 
     value: float
     quantity: float
     state: FilmState | None = None
+    slope: float = 0.0
 
 
 def value_of(state: FilmState, quantity: str) -> float:
@@ -145,10 +254,63 @@ def value_of(state: FilmState, quantity: str) -> float:
     return abs(values[quantity])
 
 
-def slope_of(state: FilmState, quantity: str, key: str) -> float:
-    """Log derivative of a quantity of a film by a key; 0 where it does not depend on it."""
+def slope_of(state: FilmState, quantity: str, by: Lever) -> float:
+    """Log derivative of a quantity of a film by that of the key of a lever and those with it."""
     assert state.sensitivity is not None
-    return state.sensitivity.get(quantity, {}).get(key, 0.0)
+    slopes = state.sensitivity.get(quantity, {})
+    return sum(share * slopes.get(key, 0.0) for key, share in by.exponents.items())
+
+
+Change = Callable[[float], float | None]
+"""Factor of a key -> that of the quantity on the held mesh, None where there is no film."""
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """The film of a case as a design sees it: its quantity, and what that depends on.
+
+    slopes: key -> log derivative of the quantity. change: on the held mesh. doubt: words where the
+    film has no sensitivities, else empty.
+    """
+
+    state: FilmState
+    value: float
+    slopes: Mapping[str, float] = field(default_factory=dict)
+    change: Change = lambda _: None
+    doubt: str = ""
+
+    @classmethod
+    def of(cls, state: FilmState, quantity: str, change: Change) -> Film:
+        """The film of one stroke."""
+        if not differentiable(state) or state.sensitivity is None:
+            return cls(state, value_of(state, quantity), doubt=f"has the verdict {state.verdict}")
+        slopes = state.sensitivity.get(quantity, {})
+        return cls(state, value_of(state, quantity), slopes, change)
+
+    @classmethod
+    def of_cycle(cls, out: FilmState, back: FilmState, travel: float) -> Film:
+        """Net leakage of a cycle: what the outstroke takes out, less what the instroke takes back.
+
+        Its log derivative is that of a difference; the films have no common mesh to be held.
+        """
+        rates = [abs(s.leak_rate_mm3_s / s.rod_speed_mm_s) * travel for s in (out, back)]
+        net, slopes = rates[0] - rates[1], dict[str, float]()
+        for state, rate in ((out, rates[0]), (back, -rates[1])):
+            if not differentiable(state) or state.sensitivity is None:
+                return cls(
+                    out, net, doubt=f"has the verdict {state.verdict} ({state.stroke}stroke)"
+                )
+            for key, slope in state.sensitivity.get("leakage", {}).items():
+                slopes[key] = slopes.get(key, 0.0) + rate * slope / net
+        return cls(out, net, slopes)
+
+    def slope(self, by: Lever) -> float:
+        """Log derivative of the quantity by that of the key of a lever and those with it."""
+        return sum(share * self.slopes.get(key, 0.0) for key, share in by.exponents.items())
+
+
+Solve = Callable[[Seal], Film | None]
+"""The film of a case, None where there is none."""
 
 
 def changed(p: Seal, message: str, **keys: Any) -> Seal:
@@ -163,47 +325,69 @@ def changed(p: Seal, message: str, **keys: Any) -> Seal:
         raise NoDesignError(f"{message}: {reason}") from None
 
 
-Change = Callable[[float], float | None]
-"""Factor of a key -> that of the quantity on the held mesh, None where there is no film."""
-
-Film = tuple[FilmState, Change]
-"""A film with its sensitivities, and how its quantity changes with the key of a target."""
-
-Solve = Callable[[Seal], Film | None]
-"""The one film of a case, None where there is none."""
-
-
 def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[DesignStep]:
     """Steps to the value of the key of a lever that meets the target; the last one does.
 
-    Raises NoDesignError.
+    A bound that is met from the start has one step. Raises NoDesignError.
     """
     called, value = p.called(by.key), float(getattr(p, by.key))
-    state, _ = _film(p, by, solve)
-    steps = [DesignStep(value, value_of(state, target.quantity), state)]
-    target_value = target.factor * steps[0].quantity
+    film = _film(p, by, solve)
+    steps = [DesignStep(value, film.value, film.state, film.slope(by))]
+    if target.within(film.value):
+        return steps
+    goal = target.aim(film.value)
     for _ in range(STEPS):
-        slope = slope_of(state, target.quantity, by.key)
-        log_change = math.log(target_value / steps[-1].quantity)
+        slope = film.slope(by)
+        if film.value <= 0.0:
+            raise NoDesignError(
+                f"the seal returns what it takes out with {by.value_text(p)}: its leakage is "
+                f"{film.value:.3g} {target.unit}, and {goal:.5g} is not reached in per cent of that"
+            )
+        log_change = math.log(goal / steps[-1].quantity)
         if abs(log_change) > 0.5 * abs(slope):  # the key would change by more than half
             raise NoDesignError(
                 f"{target.quantity} follows {called} by {slope:.2g} % for 1 %: that is too "
-                "little for this target; choose another key (sensitivity.csv shows which have an "
-                "influence)"
+                "little for this target; choose another key or several (sensitivity.csv shows "
+                "which have an influence)"
             )
         value *= math.exp(log_change / slope)
         message = f"the target needs a {called} that a case cannot have"
-        changed_case = changed(p, message, **{by.key: value})
-        state, change = _film(changed_case, by, solve)
-        steps.append(DesignStep(value, value_of(state, target.quantity), state))
-        if abs(steps[-1].quantity / target_value - 1.0) <= TOLERANCE:
-            value_near, goal = by.value_text(changed_case), target.value_text(target_value)
-            missed = f"near {value_near} no value gives {goal} on one mesh"
-            return [*steps, *settled(steps[-1], target_value, slope, change, missed)]
+        changed_case = changed(p, message, **by.keys_at(p, value))
+        film = _film(changed_case, by, solve)
+        steps.append(DesignStep(value, film.value, film.state, film.slope(by)))
+        if target.within(film.value):
+            return steps
+        if not target.side and abs(film.value / goal - 1.0) <= TOLERANCE:
+            if target.quantity == CYCLE:  # a difference of two films, each on its own mesh
+                return steps
+            value_near, wanted = by.value_text(changed_case), target.value_text(goal)
+            missed = f"near {value_near} no value gives {wanted} on one mesh"
+            return [*steps, *settled(steps[-1], goal, slope, film.change, missed)]
     raise NoDesignError(
         f"{target.value_text(steps[-1].quantity)} after {STEPS} solves, wanted was "
-        f"{target_value:.5g}: ask for a smaller change"
+        f"{target.wanted}: ask for a smaller change"
     )
+
+
+def joint_lever(p: Seal, levers: Sequence[Lever], film: Film) -> Lever:
+    """Several levers as one, by the least sum of squares of the relative changes of their values.
+
+    With log quantity = sum S_k x_k to first order, x_k the log change of the value of a lever, that
+    least sum has x_k in proportion to S_k. The first of the joint lever moves the quantity most.
+    """
+    gears = [lever.gear(p) for lever in levers]
+    by_value = [
+        film.slopes.get(lever.key, 0.0) / gear for lever, gear in zip(levers, gears, strict=True)
+    ]
+    main = max(range(len(levers)), key=lambda n: abs(by_value[n]))
+    if by_value[main] == 0.0:
+        names = " and ".join(lever.name for lever in levers)
+        raise NoDesignError(f"the quantity does not depend on {names}; choose other keys")
+    log_changes = [slope / gear for slope, gear in zip(by_value, gears, strict=True)]
+    others = tuple(
+        (lever, log_changes[n] / log_changes[main]) for n, lever in enumerate(levers) if n != main
+    )
+    return replace(levers[main], others=others)
 
 
 def settled(
@@ -230,10 +414,10 @@ def settled(
 
 def _film(p: Seal, by: Lever, solve: Solve) -> Film:
     film = solve(p)
-    if film is None or not differentiable(film[0]) or film[0].sensitivity is None:
-        verdict = "did not converge" if film is None else f"has the verdict {film[0].verdict}"
+    if film is None or film.doubt:
+        doubt = "did not converge" if film is None else film.doubt
         raise NoDesignError(
-            f"with {by.value_text(p)} the film {verdict}: no sensitivities of it; use a "
+            f"with {by.value_text(p)} the film {doubt}: no sensitivities of it; use a "
             "larger density, or ask for a smaller change"
         )
     return film
@@ -271,12 +455,18 @@ class Design:
         return self.at(self.steps[-1].value)
 
     def at(self, value: float) -> Seal:
-        """The case with another value of the key."""
-        return self.parameters.model_copy(update={self.by.key: value})
+        """The case with another value of the key, and of those that change with it."""
+        return self.parameters.model_copy(update=self.by.keys_at(self.parameters, value))
 
     def measure(self, value: float) -> float:
         """The value of what a user named, where the key has this one."""
         return self.by.value(self.at(value))
+
+    @property
+    def moved(self) -> list[tuple[Lever, float, float]]:
+        """Each lever with its value before and after."""
+        levers = [self.by, *(lever for lever, _ in self.by.others)]
+        return [(lever, lever.value(self.parameters), lever.value(self.met)) for lever in levers]
 
     @property
     def films(self) -> list[tuple[float, FilmState]]:
@@ -289,22 +479,51 @@ class Design:
         return 100.0 * (self.steps[-1].quantity / self.steps[0].quantity - 1.0)
 
 
-def design_case(p: Seal, target: str, key: str, observer: Observer) -> Design:
-    """The way to a target by a key.  Raises BadInput, also where it is not reached."""
+def design_case(p: Seal, target: str, keys: Sequence[str], observer: Observer) -> Design:
+    """The way to a target by keys.  Raises BadInput, also where it is not reached."""
+    levers = [_lever(p, key) for key in dict.fromkeys(keys)]
+    behind = [lever.key for lever in levers]
+    if twice := [lever.name for lever in levers if behind.count(lever.key) > 1]:
+        raise BadInput(f"--by {' and '.join(twice)} decide one key; give one of them")
+    goal, p = Target.of(target), _one_film(p)
+    films = dict[Seal, Film | None]()
+
+    def solve(q: Seal) -> Film | None:
+        if q not in films:
+            films[q] = _solved(q, goal.quantity, by, observer)
+        return films[q]
+
+    by = levers[0]
+    if len(levers) > 1:
+        by = joint_lever(p, levers, _film(p, by, solve))
+        films.clear()  # their held meshes are those of one key
+    return Design(p, goal, by, designed(p, goal, by, solve))
+
+
+def _lever(p: Seal, key: str) -> Lever:
+    """The lever of a key that a user names.  Raises BadInput."""
     name = DIAMETERS.get(key, key)
     base, _ = BASES.get(name, (name, name))
     names = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
     if base not in names:
         hint = f" ({INSTEAD[base]})" if base in INSTEAD else did_you_mean(base, names)
         raise BadInput(f"--by {base}{hint}: allowed: {', '.join([*names, *BASES])}")
-    p = _one_film(p)
-    by, goal = Lever(name if name in BASES else p.called(base), base), Target.of(target)
+    return Lever(name if name in BASES else p.called(base), base)
 
-    def solve(q: Seal) -> Film | None:
-        film = HeldFilm.of(q, observer)
-        return (film.state, partial(film.change, goal.quantity, base)) if film else None
 
-    return Design(p, goal, by, designed(p, goal, by, solve))
+def _solved(q: Seal, quantity: str, by: Lever, observer: Observer) -> Film | None:
+    """The film of a case, or for a cycle those of both strokes."""
+    held = HeldFilm.of(q, observer)
+    if held is None or quantity != CYCLE:
+        change = partial(held.change, quantity, by.exponents) if held else None
+        return Film.of(held.state, quantity, change) if held and change else None
+    other = HeldFilm.of(
+        q.model_copy(update={"stroke": "in" if q.stroke == "out" else "out"}), observer
+    )
+    if other is None:
+        return None
+    out, back = (held, other) if q.stroke == "out" else (other, held)
+    return Film.of_cycle(out.state, back.state, q.travel)
 
 
 def _one_film(p: Seal) -> Seal:
@@ -339,22 +558,31 @@ class HeldFilm:
         report_film(observer, state)
         return cls(FilmCase(film.system, film.loads), film.x, contact.newton, state)
 
-    def change(self, quantity: str, key: str, factor: float) -> float | None:
+    def change(self, quantity: str, keys: Mapping[str, float], factor: float) -> float | None:
         """A quantity over its value here, where a key is `factor` times as large; None if that film
         is not reached from this one.
+
+        keys: each key that changes, and its log change for one of the first.
         """
 
+        def case_at(logarithm: float) -> FilmCase:
+            case = self.case
+            for key, share in keys.items():
+                case = case.scaled(key, math.expm1(share * logarithm))
+            return case
+
         def problem_at(logarithm: float) -> NonlinearProblem:
-            return self.case.scaled(key, math.expm1(logarithm)).problem
+            return case_at(logarithm).problem
 
         # a hundredth of a millimetre is many films; the least step moves a quantity that follows
         # tenfold by `SETTLED`
         log_factor, minimum = math.log(factor), 0.1 * SETTLED
-        path = Continuation(self.newton, StepRule(max(abs(log_factor), minimum), minimum), name=key)
+        rule = StepRule(max(abs(log_factor), minimum), minimum)
+        path = Continuation(self.newton, rule, name=" ".join(keys))
         branch = path.follow(problem_at, 0.0, log_factor, self.x)
         if not branch.converged:
             return None
-        changed_quantities = quantities(self.case.scaled(key, factor - 1.0), branch.last.x)
+        changed_quantities = quantities(case_at(log_factor), branch.last.x)
         return changed_quantities[quantity].value / quantities(self.case, self.x)[quantity].value
 
 
@@ -365,20 +593,31 @@ def design_lines(design: Design) -> list[str]:
     sign = 1.0 if p.stroke == "out" else -1.0
     name, unit = design.by.name, f" {design.by.unit}".rstrip()
     values = [design.measure(step.value) for step in steps]
-    lines = [f"p_s = {p.sealed_pressure:g} MPa, U = {sign * p.speeds[0]:+g} mm/s"]
+    strokes = f"{sign * p.speeds[0]:+g} mm/s"
+    if target.quantity == CYCLE:
+        strokes = f"+-{p.speeds[0]:g} mm/s, a cycle of {p.travel:g} mm out and back"
+    lines = [f"p_s = {p.sealed_pressure:g} MPa, U = {strokes}"]
     lines += [
         f"  {name} = {value:.8g}{unit}: {target.value_text(step.quantity)}"
         for step, value in zip(steps, values, strict=True)
     ]
+    if len(steps) == 1:
+        return [*lines, f"{target.quantity} is {target.wanted} already; nothing needs to change"]
     moved = 100.0 * (values[-1] / values[0] - 1.0)
     alone = 100.0 * (steps[1].quantity / first.quantity - 1.0)
     lines.append(
-        f"{target.quantity} {design.change:+.2f} % (wanted {target.percent:+g} %) by {name} = "
+        f"{target.quantity} {design.change:+.2f} % (wanted {target.wanted}) by {name} = "
         f"{values[-1]:.8g}{unit} ({moved:+.3f} %); by the first sensitivity alone: "
         f"{values[1]:.8g}{unit}, which gives {alone:+.2f} %"
     )
-    if name in BASES:
-        decided = Lever(p.called(design.by.key), design.by.key)
-        previous, after = (decided.value(design.at(step.value)) for step in (first, last))
-        lines.append(f"{decided.name} from {previous:.5g} to {after:.5g} mm")
+    for lever, before, after in design.moved[1:]:
+        lines.append(
+            f"  and {lever.name} = {after:.8g} {lever.unit}".rstrip()
+            + f" ({100.0 * (after / before - 1.0):+.3f} %)"
+        )
+    for lever, _, _ in design.moved:
+        if lever.name in BASES:
+            decided = Lever(p.called(lever.key), lever.key)
+            previous, later = (decided.value(design.at(step.value)) for step in (first, last))
+            lines.append(f"{decided.name} from {previous:.5g} to {later:.5g} mm")
     return lines
