@@ -279,6 +279,8 @@ def _write(
     if not quiet:
         size_text = f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.0f} kB"
         click.echo(f"written to {path} ({size_text})")
+        if xlsx:
+            click.echo(f"written to {path.with_suffix('.xlsx')}")
 
 
 @contextmanager

@@ -242,7 +242,7 @@ class CycleCase(Case[Cycle, CycleRow]):
     selection = ("cycles", "animation")
     files = (*(f"{n}.{k}" for n in ("rows", *PICTURES) for k in KINDS), ANIMATION)
 
-    left_out = tuple(limit for limit in LEFT_OUT if not limit.startswith("Time"))
+    left_out = tuple(limit for limit in LEFT_OUT if not limit.startswith(("Time", "Breakaway")))
 
     def assumed(self, parameters: Cycle, set_keys: Collection[str]) -> list[str]:
         """See :class:`Case`."""
@@ -270,7 +270,8 @@ class CycleCase(Case[Cycle, CycleRow]):
         if parameters.path.drift:
             leak = f"{row.leak_mm3:+.3g} mm3 past the air end, by a rod that does not come back"
         elif row.leak_mm3 > 0.0 and parameters.motion is None:
-            leak += f", {far(row.leak_mm3, parameters.travel)}"
+            period = 1.0 / parameters.frequency
+            leak += f", {far(row.leak_mm3, parameters.travel, parameters.service, period)}"
         back = f", {-row.friction_in_N:.3g} N in" if row.friction_in_N < 0.0 else ""
         friction = f"friction {row.friction_out_N:.3g} N out{back} at most"
         parts = [f"cycle {row.cycle:g}: {leak}", friction]

@@ -13,7 +13,7 @@ from softehl.cases.harness.row import OK, Record
 from softehl.cases.seal.gland.messages import assumed, foreword, warnings
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report import paraview, tables
-from softehl.cases.seal.report.model_limits import LEFT_OUT, cautions, titled
+from softehl.cases.seal.report.model_limits import BREAKAWAY, LEFT_OUT, cautions, titled
 from softehl.cases.seal.states import run_plan
 from softehl.cases.seal.states.leakage import net_leakage
 from softehl.cases.seal.states.sensitivity_table import differentiable, resolved
@@ -35,7 +35,7 @@ class ORingCase(Case[Seal, FilmRow]):
     title = "reciprocating O-ring, a rod seal: film thickness, friction, leakage over the rod speed"
     parameters = Seal
     row = FilmRow
-    selection = ("speeds", "stroke", "travel", "solver", "linear", "tolerance")
+    selection = ("speeds", "stroke", "travel", "service", "solver", "linear", "tolerance")
     method_keys = ("solver", "linear")
     files = (
         *("sensitivity.csv", "sensitivity_*.csv", "tolerances.csv"),
@@ -102,7 +102,7 @@ class ORingCase(Case[Seal, FilmRow]):
 
     def summary(self, parameters: Seal, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""
-        return run_summary(rows, parameters.travel, parameters.stroke)
+        return run_summary(rows, parameters.travel, parameters.stroke, parameters.service)
 
     def details(self, parameters: Seal, folder: Path) -> list[str]:
         """See :class:`Case`: tolerances and sensitivities."""
@@ -148,7 +148,7 @@ class ORingCase(Case[Seal, FilmRow]):
 
     def cautions(self, parameters: Seal) -> list[str]:
         """See :class:`Case`."""
-        return cautions(parameters)
+        return [*cautions(parameters), BREAKAWAY]
 
     def draw(
         self,

@@ -681,7 +681,8 @@ def test_modelica_reads_friction_between_films() -> None:
 def test_files_of_a_hand_over(tmp_path: Path) -> None:
     law = LAWS["Cylinder Friction"]
     one = write_hand_over(tmp_path / "seal", [finished(1.0, law)])
-    assert one[0] == f"8 speeds at 1 pressure written to {tmp_path / 'seal'}"
+    written = f"8 speeds at 1 pressure written to {tmp_path / 'seal'}"
+    assert one[0] == f"{written}: {', '.join(FILES)}"
     said = write_hand_over(
         tmp_path / "seal",
         [finished(1.0, law), finished(5.0, law, FILM_SPEEDS[1:])],

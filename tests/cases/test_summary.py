@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from math import nan
@@ -23,6 +24,7 @@ from softehl.cases.harness.runner import RecordingObserver
 from softehl.cases.oring import CASE
 from softehl.cases.seal.cycle.transient import March, Reading
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.trade.service_names import service_cycles
 from softehl.cases.seal.report.parts import tolerances
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.states.state import OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
@@ -79,6 +81,19 @@ def test_whether_a_seal_leaks_and_what_friction_it_has(
     assert line.startswith("  400 mm/s: ")
     assert said in line
     assert not isinstance(line, Alarm)
+
+
+def test_leakage_of_a_service() -> None:
+    """A cycle of 100 mm at 400 mm/s lasts 0.5 s: 2000 h are 1.44e7 cycles, 500 km 2.5e6."""
+    rows = [row(400.0, 1.4), row(-400.0, 1.1)]
+    cycle_mm3 = float(re.findall(r"leaks (\S+) mm3", run_summary(rows, 100.0)[0])[0])
+    for service, cycles_of_it in {"1e6 cycles": 1e6, "2000 h": 1.44e7, "500 km": 2.5e6}.items():
+        line = run_summary(rows, 100.0, service=service)[1]
+        (litres,) = re.findall(rf"travel, (\S+) l in {service};", line)
+        assert float(litres) == pytest.approx(1e-6 * cycle_mm3 * cycles_of_it, rel=0.01)
+    with pytest.raises(ValueError, match='write "1e6 cycles", "2000 h" or "500 km"'):
+        Seal(service="2000")
+    assert service_cycles("3 km", 100.0, 0.5) == 15_000.0
 
 
 def test_films_thinner_than_roughness_are_an_alarm() -> None:

@@ -51,7 +51,7 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
         "gland": _declared_keys(Gland),
         "rubber": (*dict.fromkeys(("compound", "shore_A", *Rubber.model_fields)), "materials"),
         "oil": (*_declared_keys(Oil), *ThinningKeys.model_fields),
-        "motion": ("sealed_pressure", "speeds", "stroke", "travel"),
+        "motion": ("sealed_pressure", "speeds", "stroke", "travel", "service"),
         "film": (*Surfaces.model_fields, *_declared_keys(FilmModel)),
         "mesh": ("density", "tolerance", "error_estimate", "mesh"),
         "numerics": (
@@ -75,6 +75,12 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
             "groove_width": ("width", "gland_width", "groove_length"),
             'roughness = "Ra 0.2"': ("surface", "finish", "ra", "rq"),
             "travel": ("stroke_length", "length"),
+            'service = "1e6 cycles", "2000 h" or "500 km"': (
+                *("cycles", "service_hours", "hours", "service_km", "lifetime", "duty"),
+            ),
+            "low speeds and a roughness; the force to start after a rest is not modelled": (
+                *("breakaway", "breakaway_force", "rest", "rest_time", "dwell", "stiction"),
+            ),
             "extrusion_gap": ("gap", "clearance"),
             "squeeze": ("compression", "interference"),
             'material = "neo-hooke" and mu, a third of Young\'s modulus': (

@@ -29,6 +29,7 @@ from softehl.cases.seal.gland.sections.section_keys import (
 from softehl.cases.seal.gland.sections.shapes import HEIGHT, SECTIONS
 from softehl.cases.seal.gland.shear_thinning import ThinningKeys
 from softehl.cases.seal.gland.surfaces import Surfaces
+from softehl.cases.seal.gland.trade.service_names import read_service
 from softehl.cases.seal.meshing.outline import Shape
 from softehl.cases.seal.meshing.section_mesh import SectionMesh
 from softehl.cases.seal.meshing.two_region_mesh import CAP
@@ -141,6 +142,18 @@ class Duty(Parameters):
         bounds="a number > 0, or a list of different ones in any order",
     )
     travel: float = key(100.0, "stroke length of the rod, for leakage in a cycle", unit="mm", gt=0)
+    service: str | None = key(
+        None,
+        "service that the net leakage is also given for",
+        bounds='"1e6 cycles", "2000 h" or "500 km" of travel, left out = 100 m',
+    )
+
+    @field_validator("service")
+    @classmethod
+    def _service_is_read(cls, service: str | None) -> str | None:
+        if service is not None:
+            read_service(service)
+        return service
 
 
 THICKEST = 1e-3

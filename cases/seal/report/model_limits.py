@@ -7,6 +7,7 @@ from softehl.cases.seal.gland.sections.section_keys import NAMES, ROUND
 
 LEFT_OUT = (
     "Time: every speed is a steady state; no start, no stop, no dwell.",
+    "Breakaway: the force to start after a rest, which grows with the time at rest.",
     "Viscoelasticity and set: the rubber is hyperelastic, and as it was made.",
     "Heat: oil and rubber are at one temperature, which friction does not raise.",
     "Shear thinning, unless the case has keys for it: the oil is then Newtonian.",
@@ -21,6 +22,13 @@ LEFT_OUT = (
     "the case has keys for them.",
 )
 """A report ends with these."""
+
+
+BREAKAWAY = (
+    "the force to start after a rest (breakaway) is not in these numbers: the film is "
+    "squeezed out, the rubber sticks, and handbooks give up to three times the friction in motion"
+)
+"""Caution of steady states."""
 
 
 def cautions(p: Seal) -> list[str]:

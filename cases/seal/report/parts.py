@@ -12,6 +12,7 @@ from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.tolerances import ToleranceRow, ring_sizes
 from softehl.cases.seal.gland.trade.oil_names import read_oil_name
 from softehl.cases.seal.gland.trade.parse_terms import bands
+from softehl.cases.seal.gland.trade.service_names import service_cycles
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.bokeh_plots import curve_plot, film_plot, friction_plot
 from softehl.cases.seal.report.gland_drawing import fit_numbers, gland_figure
@@ -142,12 +143,23 @@ def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:
         travel, titles, rows = run.parameters.travel, LeakageRow.titles(), net_leakage(run.rows)
         cycle = f"net in a cycle of {travel:g} mm out and back [mm3]"
         cells = [(*row.cells()[:2], travel * row.net_mm3_per_mm, *row.cells()[2:]) for row in rows]
+        head = (*titles[:2], cycle, *titles[2:])
+        if service := run.parameters.service:
+            head = (*head, f"net in {service} [cm3]")
+            cells = [
+                (*cell, 1e-3 * row.net_mm3_per_mm * travel * _cycles(service, travel, row))
+                for cell, row in zip(cells, rows, strict=True)
+            ]
         if rows:
-            tables.append(Table(run.name, (*titles[:2], cycle, *titles[2:]), cells))
+            tables.append(Table(run.name, head, cells))
     text = (
         "Out minus in; negative: the instroke could take back more than there is, dry on balance."
     )
     return [Part("Leakage per cycle", text, tables=tables)] if tables else []
+
+
+def _cycles(service: str, travel: float, row: LeakageRow) -> float:
+    return service_cycles(service, travel, 2.0 * travel / row.speed_mm_s)
 
 
 def _surfaces(runs: Sequence[FinishedRun]) -> list[Part]:

@@ -175,7 +175,7 @@ def write_hand_over(folder: Path, runs: Sequence[FinishedRun]) -> list[str]:
     write_text(folder / FILES[2], simscape(laws, title))
     sizes = (len(seal.speeds), "speed"), (len(seal.pressures), "pressure")
     counts = " at ".join(f"{count} {what}{'s' * (count != 1)}" for count, what in sizes)
-    lines = [f"{counts} written to {folder}"]
+    lines = [f"{counts} written to {folder}: {', '.join(FILES)}"]
     if seal.left_out:
         lines.append(f"left out, as not every pressure has them: {seal.left_out}")
     if not laws:

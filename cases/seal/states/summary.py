@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from softehl.cases.harness.case import Alarm
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.surfaces import MIXED
+from softehl.cases.seal.gland.trade.service_names import service_cycles
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage, per_100_m
 from softehl.cases.seal.states.run_plan import USUAL
 from softehl.cases.seal.states.state import FilmRow
@@ -35,10 +36,13 @@ class _Speed:
         return "leaks" if self.net.net_mm3_per_mm > 0.0 else "returns"
 
 
-def run_summary(rows: Sequence[FilmRow], travel: float, stroke: str = "both") -> list[str]:
+def run_summary(
+    rows: Sequence[FilmRow], travel: float, stroke: str = "both", service: str | None = None
+) -> list[str]:
     """Answer if the seal leaks, and a line for each sealed pressure and speed |U|, fast ones first.
 
-    travel: way of the rod from end to end, mm. stroke: what was asked for. A line with a film that
+    travel: way of the rod from end to end, mm. stroke: what was asked for. service: such as "2000
+    h", which the leakage is also given for. A line with a film that
     is thinner than the roughness is an Alarm.
     """
     if not rows:
@@ -53,7 +57,7 @@ def run_summary(rows: Sequence[FilmRow], travel: float, stroke: str = "both") ->
     first = _whether(speeds, travel)
     if stroke != "both" and not nets:
         first = f'{stroke}stroke alone, as asked for; leakage needs stroke = "both"'
-    return [first, *(_line(speed, travel, stroke) for speed in speeds)]
+    return [first, *(_line(speed, travel, stroke, service) for speed in speeds)]
 
 
 def leaks(volume: float) -> str:
@@ -61,9 +65,17 @@ def leaks(volume: float) -> str:
     return f"leaks {volume:.3g} mm3" if volume > 0.0 else RETURNS
 
 
-def far(volume: float, travel: float) -> str:
-    """The net volume of a cycle (mm3) as that of 100 m, in words."""
-    return f"{1e-3 * per_100_m(volume, travel):.3g} cm3 in 100 m of travel"
+def far(volume: float, travel: float, service: str | None = None, period: float = 0.0) -> str:
+    """The net volume of a cycle (mm3) as that of 100 m, and of a service, in words.
+
+    period: of a cycle, s.
+    """
+    in_100_m = f"{1e-3 * per_100_m(volume, travel):.3g} cm3 in 100 m of travel"
+    if service is None:
+        return in_100_m
+    total = 1e-3 * volume * service_cycles(service, travel, period)
+    text = f"{total:.3g} cm3" if total < 1e3 else f"{1e-3 * total:.3g} l"
+    return f"{in_100_m}, {text} in {service}"
 
 
 def _whether(speeds: Sequence[_Speed], travel: float) -> str:
@@ -86,13 +98,13 @@ def _whether(speeds: Sequence[_Speed], travel: float) -> str:
     return f"leaks, most at {at}: {volume}" + (f"; not at {tight} of {len(kinds)}" if tight else "")
 
 
-def _line(speed: _Speed, travel: float, stroke: str) -> str:
+def _line(speed: _Speed, travel: float, stroke: str, service: str | None) -> str:
     """A speed: leakage, friction, least lambda."""
     strokes = speed.strokes
     forces = [f"{abs(row.rod_friction_N):.3g} N {stroke}" for stroke, row in strokes.items()]
     parts = [f"friction {', '.join(forces)}", *_ratio(strokes)]
     if speed.net is not None or stroke == "both":
-        parts.insert(0, _leakage(speed, travel))
+        parts.insert(0, _leakage(speed, travel, service))
     reservations = [
         f"{stroke} {row.verdict}" for stroke, row in strokes.items() if row.verdict != OK
     ]
@@ -101,7 +113,7 @@ def _line(speed: _Speed, travel: float, stroke: str) -> str:
     return Alarm(f"{line}; {thin}") if thin else line
 
 
-def _leakage(speed: _Speed, travel: float) -> str:
+def _leakage(speed: _Speed, travel: float, service: str | None) -> str:
     net, kind = speed.net, speed.kind
     if net is None:
         return "leakage needs both strokes"
@@ -114,7 +126,8 @@ def _leakage(speed: _Speed, travel: float) -> str:
     if kind == "returns":
         return f"{RETURNS} ({both})"
     volume = travel * net.net_mm3_per_mm
-    return f"{leaks(volume)} ({both}), {far(volume, travel)}"
+    period = 2.0 * travel / net.speed_mm_s
+    return f"{leaks(volume)} ({both}), {far(volume, travel, service, period)}"
 
 
 def _ratio(strokes: Mapping[str, FilmRow]) -> Iterator[str]:
