@@ -42,6 +42,7 @@ from softehl.runtime.definition.initial_values import add_initial_values
 from softehl.runtime.definition.kernel_loading import KernelOrigin, Source
 from softehl.runtime.definition.problem_definition import (
     Datum,
+    Number,
     ProblemDefinition,
     StudyError,
     Where,
@@ -350,11 +351,15 @@ class Study:
         side: str | Predicate,
         other: str | Predicate | None = None,
         *,
-        friction: float = 0.0,
+        friction: float | None = None,
         name: str = "contact",
         of: Sequence[str] | None = None,
         stiffness: float | None = None,
         depth: float | None = None,
+        law: Source | None = None,
+        model: str | None = None,
+        reach: float | None = None,
+        **parameters: Number,
     ) -> None:
         """Add contact with finite sliding between two sides, or of one side with itself.
 
@@ -365,8 +370,8 @@ class Study:
             `Result.fields(name)` has its pressure and shear stress.
         other : str or callable, optional
             The other side; left out, `side` is in contact with itself.
-        friction : float
-            Coulomb's coefficient of friction.
+        friction : float, optional
+            Coulomb's coefficient of friction; 0 if left out.
         name : str
             Name of the block.
         of : sequence of str, optional
@@ -377,11 +382,23 @@ class Study:
         depth : float, optional
             Penetration above which sides are not in contact [mm]; half of the body's thickness if
             left out.
+        law : page, optional
+            Law of contact in place of impenetrability and Coulomb's friction: a page, or its file,
+            that says with `m.gap`, `m.slip` and `m.jump(T)` what acts between a point of the first
+            side and its partner, per undeformed area of the first side.
+        model : str, optional
+            Which page, if the file of the law has several.
+        reach : float, optional
+            Gap up to which the law acts [mm]; the length of a face if left out.
+        **parameters : float or callable
+            Parameters of the law; functions of time are allowed.
 
         Raises
         ------
         StudyError
             The name exists, or an argument is not allowed.
+        ModelError
+            The law is wrong.
         MeshError
             The mesh has no such side.
         """
@@ -390,9 +407,13 @@ class Study:
             name,
             (side, other),
             of,
+            law=law,
+            model=model,
+            parameters=parameters,
             friction=friction,
             stiffness=stiffness,
             depth=depth,
+            reach=reach,
         )
 
     def initial(

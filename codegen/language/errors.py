@@ -83,3 +83,8 @@ class WrongDomainError(ModelError):
     def no_facet(cls, what: str, cell: str) -> WrongDomainError:
         """Error for a quantity of facets that a weak form uses on a cell."""
         return cls(f'{what}: {cell} is a cell here; facets are on="interior" and sides of a mesh')
+
+    @classmethod
+    def no_pair(cls, what: str) -> WrongDomainError:
+        """Error for a quantity of pairs that another weak form uses."""
+        return cls(f"{what}: only a law of contact has it, study.contact(..., law=page)")

@@ -168,8 +168,26 @@ class Fields(Model):
         """Volume of the cell at a facet per area of the facet, a length [mm]."""
         raise WrongDomainError.no_facet("m.size", self.cell.name)
 
+    @property
+    def gap(self) -> Any:
+        """Distance of the sides in a law of contact, along the normal [mm]; negative overlap."""
+        raise WrongDomainError.no_pair("m.gap")
+
+    @property
+    def slip(self) -> Any:
+        """Motion (dimension, 1) of the first side in a law of contact, along itself [mm].
+
+        It is that against the second side since the step before.
+        """
+        raise WrongDomainError.no_pair("m.slip")
+
+    @property
+    def area_ratio(self) -> Any:
+        """Deformed over undeformed area of the first side, in a law of contact."""
+        raise WrongDomainError.no_pair("m.area_ratio")
+
     def jump(self, value: Any) -> Any:
-        """Return the jump of a value on a facet.
+        """Return the jump of a value on a facet, or between the sides of a law of contact.
 
         It is the value in the cell that the normal leaves, less that in the other one.
 

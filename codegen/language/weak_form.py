@@ -23,6 +23,7 @@ from softehl.codegen.language.fields import (
 )
 from softehl.codegen.language.flatten import call_function
 from softehl.codegen.language.model_builder import varying_parameters
+from softehl.codegen.language.pair_model import PairModel
 from softehl.codegen.language.point_model import PointModel
 
 T = TypeVar("T")
@@ -102,7 +103,8 @@ class Page:
         ----------
         cell : str
             Name of a cell, such as "hex8"; "quad4_interior" is a facet between two cells,
-            "quad4_side" a side with gradients of the cell beside it. With a geometry of one
+            "quad4_side" a side with gradients of the cell beside it, "quad4_pair" and "line2_pair"
+            a law of contact in 3-D and 2-D. With a geometry of one
             dimension more it is a side: quad4 of a solid, line2 in plane strain.
         geometry : str, optional
             "plane strain", "axisymmetric" or "solid"; the default of the dimension if left out.
@@ -141,6 +143,9 @@ class Page:
 
     def _on_facet(self, name: str, kind: Element, geometry: str, facet: str) -> Definition:
         """On facets between two cells ("interior") or on those of a side ("side")."""
+        if facet == "pair":
+            pair = PairModel(name, kind, geometry, self.doc)
+            return self._made(pair, pair.finish)
         if facet not in ("interior", "side"):
             raise UnsupportedCellError(f'no facet "{facet}" of {kind.name}: "interior" or "side"')
         face = element(FACES[shape_of(kind)])

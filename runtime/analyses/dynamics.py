@@ -29,6 +29,7 @@ from softehl.runtime.analyses.time_integrators import (
     step_before_end,
 )
 from softehl.runtime.arrays import Array
+from softehl.runtime.contact.pair_law import LawContact
 from softehl.runtime.contact.penalty import with_penalty
 from softehl.runtime.definition.argument_checks import datum, require_names
 from softehl.runtime.definition.problem_definition import Datum, ProblemDefinition, StudyError
@@ -75,6 +76,12 @@ def march_with_inertia(
     """Return the motions of steps with inertia.  Raises StudyError, NotConverged."""
     prepared = options.prepare(definition)
     system, newton = prepared.system, prepared.newton
+    for contact in system.contacts:
+        if isinstance(contact, LawContact):
+            raise StudyError(
+                f"{contact.name!r}: a contact by law=... has no march with inertia: march by "
+                '"euler" or "bdf2", solve in steps, or take the contact without law='
+            )
     if isinstance(integrator, CentralDifference):
         contacts = tuple(with_penalty(contact) for contact in system.contacts)  # type: ignore[arg-type]
         system = replace(system, contacts=contacts)

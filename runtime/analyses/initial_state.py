@@ -8,7 +8,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import Block, StudyError
-from softehl.runtime.equations.system import System
+from softehl.runtime.equations.system import System, contacts_with_history
 from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.results.result import Result
 
@@ -107,7 +107,13 @@ def _take_others(target: System, source: System, x: Array, values: Array) -> Non
 def _histories(target: System, source: System, state: dict[str, Array]) -> dict[str, Array]:
     """History of points from the result, other point data as this study gives them."""
     histories = target.histories()
-    for name, initial in histories.items():
+    for contact in contacts_with_history(target):
+        others = {c.name: c for c in contacts_with_history(source)}
+        if contact.name in others and others[contact.name].history_names == contact.history_names:
+            histories[contact.name] = state[contact.name]
+    for name, initial in target.histories().items():
+        if name not in target.blocks:
+            continue
         block, old = target.blocks[name], source.blocks.get(name)
         common = [] if old is None else [n for n in block.kernel.history if n in old.kernel.history]
         if old is None or not common:

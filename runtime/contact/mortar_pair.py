@@ -21,7 +21,7 @@ from softehl.runtime.mesh.cells import CELLS, Cell
 MULTIPLIERS = 4
 """lambda and the vector tau, at the corners of a face."""
 _ITERATIONS = 8
-_Varied: TypeAlias = tuple[Array, Array]
+Varied: TypeAlias = tuple[Array, Array]
 """Values (n, ...) and their derivatives (n, ..., ndof) by the unknowns of the element."""
 
 
@@ -55,9 +55,9 @@ class MortarPairKernel:
         n, ndof = dofs.shape
         R = np.zeros((n, ndof))
         if n:
-            at = _PairGeometry.of(self, coordinates, dofs, kwargs["data"], varied=False)
-            for weight, point in at.points():
-                self._add(R, None, at, weight, point)
+            at = self._geometry(coordinates, dofs, kwargs["data"], columns=0)
+            for point in at.points():
+                self._add(R, None, point, dofs, kwargs["data"])
         return R
 
     def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
@@ -65,30 +65,41 @@ class MortarPairKernel:
         n, ndof = dofs.shape
         R, K = np.zeros((n, ndof)), np.zeros((n, ndof, ndof))
         if n:
-            at = _PairGeometry.of(self, coordinates, dofs, kwargs["data"])
-            for weight, point in at.points():
-                self._add(R, K, at, weight, point)
+            at = self._geometry(coordinates, dofs, kwargs["data"], columns=ndof)
+            for point in at.points():
+                self._add(R, K, point, dofs, kwargs["data"])
         return R, K
 
     def fields_at(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
         """None, (n, 0, 0): fields are those of the whole face."""
         return np.empty((len(dofs), 0, 0))
 
-    def _add(
-        self,
-        R: Array,
-        K: Array | None,
-        at: _PairGeometry,
-        weight: _Varied,
-        point: _IntegrationPoint,
-    ) -> None:
+    def _geometry(self, coordinates: Array, dofs: Array, data: Array, columns: int) -> FaceGeometry:
+        n, width = len(dofs), coordinates.shape[1]
+        corners = data[:, width + 4 :].reshape(n, 3, CORNER)
+        order = max(self.one.order, self.other.order)
+        moved = coordinates + dofs[:, :width], coordinates + data[:, :width]
+        X, x, previous = (v.reshape(n, -1, 3) for v in (coordinates, *moved))
+        return FaceGeometry(
+            self.one, self.other, X, x, previous, corners, columns, columns > 0, order
+        )
+
+    def _add(self, R: Array, K: Array | None, point: PairPoint, dofs: Array, data: Array) -> None:
         """Add a point of all triangles in place; K is None where only residuals are needed."""
-        n, width = len(R), 3 * at.nodes
-        z, dz = point.inputs
-        law = np.concatenate([z, at.limits], axis=1)
-        arrays = np.empty((n, 0)), np.ascontiguousarray(law[:, :16])
-        given = {"data": np.ascontiguousarray(law[:, 16:]), "parameters": np.empty(0)}
-        W, dW = weight
+        n, width = len(R), 3 * (len(self.one.nodes) + len(self.other.nodes))
+        multipliers = dofs[:, width:].reshape(n, -1, MULTIPLIERS)
+        L, dL = point.corners
+        tau = np.einsum("nk,nkc->nc", L, multipliers)
+        dtau = np.einsum("nkm,nkc->ncm", dL, multipliers)
+        for c in range(0 if K is None else MULTIPLIERS):
+            dtau[:, c, width + c :: MULTIPLIERS] += L
+        parts = [*(point.vectors[v] for v in ("apart", "slope_a", "slope_b", "came")), (tau, dtau)]
+        z, dz = (np.concatenate([p[i] for p in parts], axis=1) for i in (0, 1))
+        limits = data[:, width : width + 4]
+        arrays = np.empty((n, 0)), np.ascontiguousarray(z)
+        given = {"data": np.ascontiguousarray(limits), "parameters": np.empty(0)}
+        node_weights = _opposite(point.first, point.second)
+        W, dW = point.weight
         rows = [0, 1, 2, 12, 13, 14, 15]
         if K is None:
             f = W[:, None] * self.law.residual(*arrays, **given)[:, rows]
@@ -98,8 +109,8 @@ class MortarPairKernel:
             df += values[:, rows, None] * dW[:, None]
             f = W[:, None] * values[:, rows]
         for part, columns, (S, dS) in (
-            (slice(width), slice(3), point.node_weights),
-            (slice(width, None), slice(3, None), point.multiplier_weights),
+            (slice(width), slice(3), node_weights),
+            (slice(width, None), slice(3, None), point.corners),
         ):
             k, c = S.shape[1], f[:, columns].shape[1]
             R[:, part] += (S[:, :, None] * f[:, None, columns]).reshape(n, k * c)
@@ -110,51 +121,47 @@ class MortarPairKernel:
             K[:, part] += change.reshape(n, k * c, -1)
 
 
-@dataclass(frozen=True, eq=False)
-class _IntegrationPoint:
-    """Integration point. inputs: of the law, (n, 16). node_weights: of the nodes of both faces;
-    multiplier_weights: of the multipliers.
-    """
-
-    inputs: _Varied
-    node_weights: _Varied
-    multiplier_weights: _Varied
+def _opposite(first: Varied, second: Varied) -> Varied:
+    """Weights of what acts on a point, and with the other sign on its partner."""
+    return tuple(np.concatenate([a, -b], axis=1) for a, b in zip(first, second, strict=True))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True, eq=False)
-class _PairGeometry:
-    """Nodes of the elements at rest X, now x, and before, (n, nodes, 3), and multipliers.
+class PairPoint:
+    """Integration point of n pairs: a point of the first side and its partner.
 
-    limits: rho, friction, depth, reach. varied: with derivatives by the unknowns of the element;
-    else these have no columns.
+    weight: (n,) by the undeformed area. vectors: (n, dim) "apart", from the point to the partner,
+    "slope_a", "slope_b", along the side, and "came", which "apart" was before the step. area_ratio:
+    (n,) deformed over undeformed area. first, second, corners: shape functions (n, k) of the nodes
+    of both sides, and of the corners of the first one. place: (n, dim) of the point.
     """
 
-    pair: MortarPairKernel
+    weight: Varied
+    vectors: dict[str, Varied]
+    area_ratio: Varied
+    first: Varied
+    second: Varied
+    corners: Varied
+    place: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FaceGeometry:
+    """Nodes of two faces at rest X, now x, and before, (n, nodes, 3), and triangles of their part.
+
+    columns: derivatives are by so many unknowns; if the nodes are `varied`, the first of these move
+    them, node by node. order: of the rule.
+    """
+
+    one: Cell
+    other: Cell
     X: Array
     x: Array
     previous: Array
-    multipliers: Array
-    limits: Array
     corners: Array
+    columns: int
     varied: bool
-
-    @classmethod
-    def of(
-        cls,
-        pair: MortarPairKernel,
-        coordinates: Array,
-        dofs: Array,
-        data: Array,
-        *,
-        varied: bool = True,
-    ) -> _PairGeometry:
-        n, width = len(dofs), coordinates.shape[1]
-        X = coordinates.reshape(n, -1, 3)
-        x, previous = (X + v[:, :width].reshape(X.shape) for v in (dofs, data))
-        corners = data[:, width + 4 :].reshape(n, 3, CORNER)
-        multipliers = dofs[:, width:].reshape(n, -1, MULTIPLIERS)
-        limits = data[:, width : width + 4]
-        return cls(pair, X, x, previous, multipliers, limits, corners, varied)
+    order: int
 
     @property
     def nodes(self) -> int:
@@ -164,71 +171,48 @@ class _PairGeometry:
     @property
     def side_nodes(self) -> slice:
         """Nodes of the face."""
-        return slice(0, len(self.pair.one.nodes))
+        return slice(0, len(self.one.nodes))
 
     @property
     def other_nodes(self) -> slice:
         """Nodes of the other one."""
-        return slice(len(self.pair.one.nodes), None)
+        return slice(len(self.one.nodes), None)
 
-    @property
-    def ndof(self) -> int:
-        """Unknowns of an element by which there are derivatives."""
-        if not self.varied:
-            return 0
-        return 3 * self.nodes + MULTIPLIERS * int(self.multipliers.shape[1])
-
-    def points(self) -> Iterator[tuple[_Varied, _IntegrationPoint]]:
-        """Weights and points of the rule of a triangle."""
+    def points(self) -> Iterator[PairPoint]:
+        """Points of the rule of a triangle."""
         normal = self._normal()
         start, *other_corners = (self._corner(k, normal) for k in range(3))
         along, across = (_minus(end, start) for end in other_corners)
         area = _triple(along, across, normal)
         positive = area[0] > 0.0
         area = area[0] * positive, area[1] * positive[:, None]
-        for (s, t), weight in zip(*_rule(self.pair), strict=True):
+        for (s, t), weight in zip(*CELLS["tri3"].rule(2 * self.order), strict=True):
             z = _plus(start, _plus(_times(s, along), _times(t, across)))
-            xi = self._project(self.pair.one, self.side_nodes, z, normal)
-            slope = self._gradient(self.pair.one, self.side_nodes, xi)
+            xi = self._project(self.one, self.side_nodes, z, normal)
+            slope = self._gradient(self.one, self.side_nodes, xi)
             first, second = ((slope[0][:, :, d], slope[1][:, :, d]) for d in (0, 1))
-            area_ratio = _over(self._area(xi), _triple(first, second, normal))
-            yield (
-                _product(_times(weight, area), area_ratio),
-                self._point(
-                    xi, self._project(self.pair.other, self.other_nodes, z, normal), first, second
-                ),
+            reference, deformed = self._area(xi), _length(_cross(first, second))
+            measure = _over(reference, _triple(first, second, normal))
+            eta = self._project(self.other, self.other_nodes, z, normal)
+            yield PairPoint(
+                weight=_product(_times(weight, area), measure),
+                vectors=self._vectors(xi, eta) | {"slope_a": first, "slope_b": second},
+                area_ratio=_over(deformed, reference),
+                first=_shapes(self.one, xi),
+                second=_shapes(self.other, eta),
+                corners=_shapes(self.one.linear, xi),
+                place=z[0],
             )
 
-    def _point(
-        self, xi: _Varied, eta: _Varied, first: _Varied, second: _Varied
-    ) -> _IntegrationPoint:
-        one, other, side_nodes, other_nodes = (
-            self.pair.one,
-            self.pair.other,
-            self.side_nodes,
-            self.other_nodes,
-        )
-        x, y = (
-            self._moving_point(one, self.x, side_nodes, xi),
-            self._moving_point(other, self.x, other_nodes, eta),
-        )
+    def _vectors(self, xi: Varied, eta: Varied) -> dict[str, Varied]:
+        faces = ((self.one, self.side_nodes, xi), (self.other, self.other_nodes, eta))
+        x, y = (self._moving_point(cell, self.x, part, at) for cell, part, at in faces)
         was, were = (
-            self._interpolate(cell, self.previous[:, part], at)
-            for cell, part, at in ((one, side_nodes, xi), (other, other_nodes, eta))
+            self._interpolate(cell, self.previous[:, part], at) for cell, part, at in faces
         )
-        N, dN = _shapes(one, xi)
-        M, dM = _shapes(other, eta)
-        L, dL = _shapes(one.linear, xi)
-        lam = np.einsum("nk,nkc->nc", L, self.multipliers)
-        dlam = np.einsum("nkm,nkc->ncm", dL, self.multipliers)
-        for c in range(MULTIPLIERS if self.varied else 0):
-            dlam[:, c, 3 * self.nodes + c :: MULTIPLIERS] += L
-        parts = [_minus(y, x), first, second, _minus(were, was), (lam, dlam)]
-        z, dz = (np.concatenate([p[i] for p in parts], axis=1) for i in (0, 1))
-        node_weights = np.concatenate([N, -M], axis=1), np.concatenate([dN, -dM], axis=1)
-        return _IntegrationPoint((z, dz), node_weights, (L, dL))
+        return {"apart": _minus(y, x), "came": _minus(were, was)}
 
-    def _moving_point(self, cell: Cell, x: Array, part: slice, at: _Varied) -> _Varied:
+    def _moving_point(self, cell: Cell, x: Array, part: slice, at: Varied) -> Varied:
         """Place of parent coordinates, with the motion of the nodes."""
         point, change = self._interpolate(cell, x[:, part], at)
         shape = cell.shape(at[0])
@@ -237,12 +221,12 @@ class _PairGeometry:
             change[:, c, [3 * i + c for i in numbers]] += shape
         return point, change
 
-    def _interpolate(self, cell: Cell, x: Array, at: _Varied) -> _Varied:
+    def _interpolate(self, cell: Cell, x: Array, at: Varied) -> Varied:
         """Place of parent coordinates on nodes (n, k, 3) that do not move."""
         N, dN = _shapes(cell, at)
         return np.einsum("nk,nkc->nc", N, x), np.einsum("nkm,nkc->ncm", dN, x)
 
-    def _gradient(self, cell: Cell, part: slice, at: _Varied) -> _Varied:
+    def _gradient(self, cell: Cell, part: slice, at: Varied) -> Varied:
         """Slopes (n, 3, 2) of the face."""
         G, dG = _gradients(cell, at)
         x = self.x[:, part]
@@ -253,10 +237,10 @@ class _PairGeometry:
             change[:, c][:, :, [3 * i + c for i in numbers]] += G.transpose(0, 2, 1)
         return gradient, change
 
-    def _area(self, xi: _Varied) -> _Varied:
+    def _area(self, xi: Varied) -> Varied:
         """Area at rest per parent area."""
-        k = len(self.pair.one.nodes)
-        G, dG = _gradients(self.pair.one, xi)
+        k = len(self.one.nodes)
+        G, dG = _gradients(self.one, xi)
         X = self.X[:, :k]
         slope = np.einsum("nkd,nkc->ncd", G, X)
         change = np.einsum("nkdm,nkc->ncdm", dG, X)
@@ -267,12 +251,12 @@ class _PairGeometry:
         moved += np.cross(a[:, :, None], change[:, :, 1], axis=1)
         return area, np.einsum("nc,ncm->nm", across / area[:, None], moved)
 
-    def _normal(self) -> _Varied:
+    def _normal(self) -> Varied:
         """Mean normal of the face."""
-        flat = self.pair.one.linear
+        flat = self.one.linear
         k = len(flat.nodes)
         middle = np.tile(flat.nodes.mean(axis=0), (len(self.x), 1))
-        xi = middle, np.zeros((len(middle), 2, self.ndof))
+        xi = middle, np.zeros((len(middle), 2, self.columns))
         slope, change = self._gradient(flat, slice(0, k), xi)
         a, b = slope[:, :, 0], slope[:, :, 1]
         across = np.cross(a, b)
@@ -283,14 +267,14 @@ class _PairGeometry:
         moved -= n[:, :, None] * np.einsum("nc,ncm->nm", n, moved)[:, None]
         return n, moved / length[:, :, None]
 
-    def _corner(self, k: int, normal: _Varied) -> _Varied:
+    def _corner(self, k: int, normal: Varied) -> Varied:
         """Place of a corner of the triangle."""
         motion = self.corners[:, k]
         A = motion[:, 2:6].reshape(-1, 2, 2).transpose(0, 2, 1)
         B = motion[:, 8:12].reshape(-1, 2, 2).transpose(0, 2, 1)
-        zero = np.zeros((len(motion), 2, self.ndof))
-        flat, far = self.pair.one.linear, self.pair.other.linear
-        a, b = len(self.pair.one.nodes), len(far.nodes)
+        zero = np.zeros((len(motion), 2, self.columns))
+        flat, far = self.one.linear, self.other.linear
+        a, b = len(self.one.nodes), len(far.nodes)
         side_nodes, other_nodes = slice(0, len(flat.nodes)), slice(a, a + b)
         xi, eta = (motion[:, :2], zero), (motion[:, 6:8], zero)
         x, y = (
@@ -305,10 +289,10 @@ class _PairGeometry:
         at = motion[:, :2] + np.einsum("ndv,nv->nd", A, v), np.einsum("ndv,nvm->ndm", A, dv)
         return self._moving_point(flat, self.x, side_nodes, at)
 
-    def _project(self, cell: Cell, part: slice, z: _Varied, normal: _Varied) -> _Varied:
+    def _project(self, cell: Cell, part: slice, z: Varied, normal: Varied) -> Varied:
         """Parent coordinates on a face of what lies on the line through z along the normal."""
         at = np.tile(cell.nodes[: cell.corners].mean(axis=0), (len(self.x), 1))
-        zero = np.zeros((len(at), 2, self.ndof))
+        zero = np.zeros((len(at), 2, self.columns))
         for _ in range(_ITERATIONS):
             point = self._interpolate(cell, self.x[:, part], (at, zero))[0]
             K = -np.einsum("nkd,nkc->ncd", cell.gradient(at), self.x[:, part])
@@ -322,30 +306,30 @@ class _PairGeometry:
         )[1]
 
 
-def _plus(a: _Varied, b: _Varied) -> _Varied:
+def _plus(a: Varied, b: Varied) -> Varied:
     return a[0] + b[0], a[1] + b[1]
 
 
-def _minus(a: _Varied, b: _Varied) -> _Varied:
+def _minus(a: Varied, b: Varied) -> Varied:
     return a[0] - b[0], a[1] - b[1]
 
 
-def _times(number: float, a: _Varied) -> _Varied:
+def _times(number: float, a: Varied) -> Varied:
     return number * a[0], number * a[1]
 
 
-def _product(a: _Varied, b: _Varied) -> _Varied:
+def _product(a: Varied, b: Varied) -> Varied:
     """Of scalars (n,)."""
     return a[0] * b[0], a[0][:, None] * b[1] + b[0][:, None] * a[1]
 
 
-def _over(a: _Varied, b: _Varied) -> _Varied:
+def _over(a: Varied, b: Varied) -> Varied:
     """Of scalars (n,)."""
     ratio = a[0] / b[0]
     return ratio, (a[1] - ratio[:, None] * b[1]) / b[0][:, None]
 
 
-def _triple(a: _Varied, b: _Varied, c: _Varied) -> _Varied:
+def _triple(a: Varied, b: Varied, c: Varied) -> Varied:
     """(a x b) . c of vectors (n, 3)."""
     changes = (
         np.einsum("nc,ncm->nm", np.cross(v[0], w[0]), u[1])
@@ -354,7 +338,19 @@ def _triple(a: _Varied, b: _Varied, c: _Varied) -> _Varied:
     return np.einsum("nc,nc->n", np.cross(a[0], b[0]), c[0]), sum(changes)
 
 
-def _tangential_solution(K: Array, offset: _Varied, normal: _Varied) -> _Varied:
+def _cross(a: Varied, b: Varied) -> Varied:
+    """Of vectors (n, 3)."""
+    moved = np.cross(a[1], b[0][:, :, None], axis=1) + np.cross(a[0][:, :, None], b[1], axis=1)
+    return np.cross(a[0], b[0]), moved
+
+
+def _length(a: Varied) -> Varied:
+    """Of vectors (n, 3)."""
+    length = np.linalg.norm(a[0], axis=1)
+    return length, np.einsum("nc,ncm->nm", a[0] / length[:, None], a[1])
+
+
+def _tangential_solution(K: Array, offset: Varied, normal: Varied) -> Varied:
     """v with K v + g n = off, and its derivatives where v is nearly zero."""
     w = _solve_columns(K, normal[0], offset[0])
     change = offset[1] - w[:, 2, None, None] * normal[1]
@@ -372,12 +368,12 @@ def _solve_columns(K: Array, n: Array, right: Array) -> Array:
     return np.asarray(solution[:, :, 0] if flat else solution)
 
 
-def _shapes(cell: Cell, at: _Varied) -> _Varied:
+def _shapes(cell: Cell, at: Varied) -> Varied:
     """Shape functions (n, k)."""
     return cell.shape(at[0]), np.einsum("nkd,ndm->nkm", cell.gradient(at[0]), at[1])
 
 
-def _gradients(cell: Cell, at: _Varied) -> _Varied:
+def _gradients(cell: Cell, at: Varied) -> Varied:
     """Their derivatives (n, k, 2); differences are exact, they are at most quadratic."""
     change = np.zeros((*at[0].shape[:1], len(cell.nodes), 2, at[1].shape[2]))
     for d in (0, 1):
@@ -385,9 +381,3 @@ def _gradients(cell: Cell, at: _Varied) -> _Varied:
         second = cell.gradient(at[0] + h) - cell.gradient(at[0] - h)
         change += second[:, :, :, None] * at[1][:, None, None, d]
     return cell.gradient(at[0]), change
-
-
-def _rule(pair: MortarPairKernel) -> tuple[Array, Array]:
-    """Exact for a uniform pressure on faces that are parallelograms, and more on triangles."""
-    order = max(pair.one.order, pair.other.order)
-    return CELLS["tri3"].rule(2 * order)

@@ -217,6 +217,11 @@ class StateDependentBlocks(Protocol):
     """Elements that depend on the unknowns."""
 
     @property
+    def name(self) -> str:
+        """Name of the contact."""
+        ...
+
+    @property
     def friction(self) -> float:
         """Coulomb's coefficient."""
         ...
@@ -368,15 +373,17 @@ class FaceContact:
             return self.empty()
         points = self.points + moved
         result = []
-        for a, b, i, j in by_kind(self.sides, self.others, *self._pairs(points)):
+        for a, b, i, j in by_kind(self.sides, self.others, *self.pairs(x)):
             side, (label, faces) = self.sides[a], self.others[b]
             cells = CELLS[side.kind], CELLS[label]
             part = common_part(cells[0], points[side.faces[i]], cells[1], points[faces[j]])
             result.append(self._block(a, b, (i[part.pairs], j[part.pairs], part.corners), old))
         return result
 
-    def _pairs(self, node_points: Array) -> tuple[Integers, Integers]:
-        """Numbers of sides and of others, both counted through their kinds, that may meet."""
+    def pairs(self, x: Array) -> tuple[Integers, Integers]:
+        """Numbers of sides and of others, both counted through their kinds, that may meet at x."""
+        moved = np.where(self.displacements >= 0, x[self.displacements], 0.0)
+        node_points = self.points + moved
         sides = [(s.kind, s.faces) for s in self.sides]
         side, other = facing(
             _face_balls(node_points, sides),

@@ -3,47 +3,73 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.contact.body_thickness import by_normals, in_chains
 from softehl.runtime.definition.argument_checks import finite
 from softehl.runtime.definition.element_blocks import page_on
+from softehl.runtime.definition.kernel_loading import KernelOrigin
 from softehl.runtime.definition.problem_definition import (
     Block,
+    Number,
     PageOptions,
     ProblemDefinition,
     StudyError,
     display_name,
 )
-from softehl.runtime.kernels.kernel import load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, Predicate
-from softehl.runtime.suggestions import join_names
+from softehl.runtime.suggestions import did_you_mean, join_names
 
 MULTIPLIERS = {2: ("lambda", "tau"), 3: ("lambda", "tau_x", "tau_y", "tau_z")}
 """Unknowns of a contact by the dimension of its mesh."""
 KINDS = {2: ("line2", "line3"), 3: ("tri3", "quad4", "tri6", "quad8", "quad9")}
 """Faces that may touch."""
+_PAIRS = {2: ("line2_pair", "plane strain"), 3: ("quad4_pair", "solid")}
+"""Cell and geometry of the page of a law: it is the same for all faces, and for rings."""
+
+
+@dataclass(frozen=True, eq=False)
+class LawRequest:
+    """Law of a contact: its kernel on pairs, and the values of its parameters."""
+
+    kernel: Kernel
+    parameters: Mapping[str, Number]
+
+    @property
+    def conservative(self) -> bool:
+        """True if it has an energy of the present state alone."""
+        states = ("came_", "_before")
+        past = any(u.startswith(states[0]) or u.endswith(states[1]) for u in self.kernel.unknowns)
+        return "energy" in self.kernel.tasks and not past
 
 
 @dataclass(frozen=True, eq=False)
 class ContactRequest:
     """Request of a contact.
 
-    labels: of the blocks of its sides, one for each kind. other_faces: kind -> faces that it may
-    meet. names: of the displacements. alone: both are one surface. stiffness, depth: None: derived.
+    labels: of the blocks of its sides, one for each kind; none with a law. faces: of the first side
+    by kind, other_faces: those that it may meet. names: of the displacements; named: as given.
+    alone: both are one surface. stiffness, depth, reach: None: derived. friction: with a law 1
+    unless that is conservative.
     """
 
     name: str
     labels: tuple[str, ...]
+    faces: tuple[tuple[str, Integers], ...]
     other_faces: tuple[tuple[str, Integers], ...]
     names: tuple[str, ...]
+    named: bool
     friction: float
     axisymmetric: bool
     alone: bool
     stiffness: float | None
     depth: float | None
+    reach: float | None = None
+    law: LawRequest | None = None
 
     def unknown(self, multiplier: str) -> str:
         """Name of an unknown of the contact."""
@@ -55,18 +81,69 @@ def add_contact(
     name: str,
     sides: tuple[str | Predicate, str | Predicate | None],
     of: Sequence[str] | None,
+    *,
+    law: object = None,
+    model: str | None = None,
+    parameters: Mapping[str, Any],
     **coefficients: float | None,
 ) -> None:
     """Add contact between two sides; see `Study.contact`.
 
-    coefficients: friction, stiffness, depth.
+    coefficients: friction, stiffness, depth, reach.
     """
-    if name in definition.blocks:
-        existing = join_names(definition.blocks)
-        raise StudyError(f"contact(name={name!r}): the name is taken; blocks: {existing}")
-    contact, blocks = _contact_and_sides(definition, name, sides, of, coefficients)
+    taken = [*definition.blocks, *(contact.name for contact in definition.contacts)]
+    if name in taken:
+        raise StudyError(f"contact(name={name!r}): the name is taken; blocks: {join_names(taken)}")
+    context = f"contact({', '.join(display_name(s) for s in sides if s is not None)})"
+    if law is None and parameters:
+        raise StudyError(
+            f"{context}: {join_names(parameters)}: only a law, law=page, has parameters"
+        )
+    if law is None and coefficients["reach"] is not None:
+        raise StudyError(
+            f"{context}: reach = {coefficients['reach']:g}: only a law, law=page, has it"
+        )
+    if law is not None:
+        for key in ("friction", "stiffness"):
+            if coefficients[key] is not None:
+                raise StudyError(f"{context}: {key} = {coefficients[key]:g}: a law states its own")
+    contact, blocks = _contact_and_sides(definition, name, sides, of, coefficients, law is None)
+    if law is not None:
+        request = _law(definition, context, (law, model), parameters)
+        contact = replace(contact, law=request, friction=float(not request.conservative))
     definition.blocks.update(blocks)
     definition.contacts.append(contact)
+
+
+def _law(
+    definition: ProblemDefinition,
+    context: str,
+    source: tuple[object, str | None],
+    parameters: Mapping[str, Any],
+) -> LawRequest:
+    """The kernel of a law on pairs, and its parameters.  Raises StudyError."""
+    cell, geometry = _PAIRS[definition.mesh.dimension]
+    kernel = KernelOrigin(*source, geometry, law=False).loaded(cell)
+    if kernel.cell != cell:
+        raise StudyError(
+            f"{context}: {kernel.name} is no law of contact: give a page of m.gap, "
+            "m.slip and m.jump(...), under @softehl.page"
+        )
+    if kernel.arrays or kernel.data:
+        names = join_names([*(a.name for a in kernel.arrays), *kernel.data])
+        raise StudyError(f"{context}: {names}: a law of contact has numbers as parameters")
+    for key in parameters:
+        if key not in kernel.parameters:
+            hint = did_you_mean(key, kernel.parameters)
+            raise StudyError(
+                f"{context}: {kernel.name} has no parameter {key!r}{hint}; it has "
+                f"{join_names(kernel.parameters)}"
+            )
+    missing = [name for name in kernel.parameters if name not in parameters]
+    if missing:
+        raise StudyError(f"{context}: give {join_names(missing)}, parameters of {kernel.name}")
+    values = {k: v if callable(v) else finite(f"{context}: {k}", v) for k, v in parameters.items()}
+    return LawRequest(kernel, values)
 
 
 def _contact_and_sides(
@@ -75,6 +152,7 @@ def _contact_and_sides(
     sides: tuple[str | Predicate, str | Predicate | None],
     of: Sequence[str] | None,
     coefficients: Mapping[str, float | None],
+    with_blocks: bool,
 ) -> tuple[ContactRequest, dict[str, Block]]:
     """A contact and the blocks of its sides.  Raises StudyError, MeshError."""
     mesh, axisymmetric = definition.mesh, definition.axisymmetric
@@ -105,19 +183,22 @@ def _contact_and_sides(
     if alone:
         side_faces = other_faces = {k: _in_order(mesh, faces) for k, faces in side_faces.items()}
     blocks = {}
-    for kind, faces in side_faces.items():
+    for kind, faces in side_faces.items() if with_blocks else ():
         label = name if len(side_faces) == 1 else f"{name}:{kind}"
         blocks[label] = _block(mesh, name, label, (kind, faces), names, float(axisymmetric))
     contact = ContactRequest(
         name=name,
         labels=(*blocks,),
+        faces=(*side_faces.items(),),
         other_faces=(*other_faces.items(),),
         names=names,
+        named=of is not None,
         friction=numbers["friction"] or 0.0,
         axisymmetric=axisymmetric,
         alone=alone,
         stiffness=numbers["stiffness"],
         depth=numbers["depth"],
+        reach=numbers["reach"],
     )
     return contact, blocks
 

@@ -10,6 +10,7 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.contact.body_thickness import inner_radii, thickness
 from softehl.runtime.contact.mortar_pair import MortarPairKernel
+from softehl.runtime.contact.pair_law import LawContact, PairLawKernel, corner_areas
 from softehl.runtime.contact.search import Contact, ContactSide, FaceContact, StateDependentBlocks
 from softehl.runtime.definition.contact_sides import MULTIPLIERS, ContactRequest
 from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
@@ -20,7 +21,7 @@ from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS, Cell, measures
 from softehl.runtime.suggestions import did_you_mean, join_names
 
-AnyContact: TypeAlias = Contact | FaceContact
+AnyContact: TypeAlias = Contact | FaceContact | LawContact
 _SOFTER, _SOFTEST = 0.25, 0.1
 """Of the stiffness of the bodies at their sides; of quadratic faces in 3-D, whose gap varies inside
 them. Blocks, discs and dies with and without friction need as many iterations from 0.03 to 0.25;
@@ -36,19 +37,22 @@ def contact_of(
     Raises StudyError.
     """
     mesh = definition.mesh
-    _require_displacements(definition, request)
+    moves = _moves(definition, request)
     sides = []
-    for label in request.labels:
-        block = definition.blocks[label]
-        x = mesh.points[block.nodes]
+    for kind, faces in request.faces:
+        x = mesh.points[faces]
         reach = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)  # of the order of a face
+        if request.reach is not None:
+            reach = np.full(len(reach), request.reach)
         measure = inner_radii if request.alone else thickness
-        depth = measure(mesh.points, mesh.boundary, block.nodes)
+        depth = measure(mesh.points, mesh.boundary, faces)
         depth = np.minimum(depth, float(np.ptp(mesh.points, axis=0).max()))
         if request.depth is not None:
             depth = np.full(len(reach), request.depth)
-        sides.append(ContactSide(block.kind, block.nodes, np.ones(len(reach)), depth, reach))
+        sides.append(ContactSide(kind, faces, np.ones(len(reach)), depth, reach))
     kinds = [(s.kind, other) for s in sides for other, _ in request.other_faces]
+    if request.law is not None:
+        return _law_contact(definition, numbering, request, sides, moves=moves)
     unknowns = [request.unknown(m) for m in MULTIPLIERS[mesh.dimension]]
     displacements = np.stack([numbering.nodal[n] for n in request.names], axis=1)
     multipliers = np.stack([numbering.nodal[n] for n in unknowns], axis=1)
@@ -82,17 +86,118 @@ def contact_of(
     )
 
 
-def _require_displacements(definition: ProblemDefinition, request: ContactRequest) -> None:
-    """Raise StudyError for displacements that no page of a body has."""
+def _law_contact(
+    definition: ProblemDefinition,
+    numbering: Numbering,
+    request: ContactRequest,
+    sides: list[ContactSide],
+    *,
+    moves: bool,
+) -> LawContact:
+    """A contact by a law.  Raises StudyError."""
+    assert request.law is not None
+    mesh, law, kernels = definition.mesh, request.law.kernel, {}
+    nowhere = np.full(len(mesh.points), -1)
+    displacements = np.stack(
+        [numbering.nodal[n] if moves else nowhere for n in request.names], axis=1
+    )
+    multipliers = np.empty((len(mesh.points), 0), dtype=np.int64)
+    search: Contact | FaceContact
+    if mesh.dimension == 3:
+        search = FaceContact(
+            name=request.name,
+            points=mesh.points,
+            displacements=displacements,
+            multipliers=multipliers,
+            sides=tuple(sides),
+            others=request.other_faces,
+            kernels={},
+            alone=request.alone,
+        )
+    else:
+        search = Contact(
+            name=request.name,
+            points=mesh.points,
+            displacements=displacements,
+            multipliers=multipliers,
+            sides=tuple(sides),
+            others=request.other_faces,
+            kernels={},
+            ring=request.axisymmetric,
+            alone=request.alone,
+        )
+    order = max(CELLS[kind].order for kind, _ in (*request.faces, *request.other_faces))
+    names = [u.removesuffix("_first") for u in law.unknowns if u.endswith("_first")]
+    fields = {name: _field(numbering, request, name) for name in names}
+    for kind, faces in request.faces:
+        for other, other_faces in request.other_faces:
+            counts = {
+                name: tuple(
+                    _count(request, name, dofs, f) for f in ((kind, faces), (other, other_faces))
+                )
+                for name, dofs in fields.items()
+            }
+            kernels[kind, other] = PairLawKernel(
+                law=law,
+                one=CELLS[kind],
+                other=CELLS[other],
+                moves=moves,
+                ring=request.axisymmetric,
+                order=order,
+                counts=counts,  # type: ignore[arg-type]
+                values=request.law.parameters,
+            )
+    history = sum(u.endswith("_before") for u in law.unknowns)
+    return LawContact(
+        name=request.name,
+        search=search,
+        kernels=kernels,
+        fields=fields,
+        areas=corner_areas(search),
+        history=np.zeros((len(mesh.points), 1, history)),
+        friction=request.friction,
+    )
+
+
+def _field(numbering: Numbering, request: ContactRequest, name: str) -> Array:
+    """Numbers of a field of a law at each node.  Raises StudyError where no page has it."""
+    if name not in numbering.nodal:
+        raise StudyError(
+            f"{request.name!r}: no unknown {name!r}{did_you_mean(name, numbering.nodal)}; at "
+            f"nodes: {join_names(numbering.nodal)}"
+        )
+    return numbering.nodal[name]
+
+
+def _count(request: ContactRequest, name: str, dofs: Array, faces: tuple[str, Array]) -> int:
+    """Number of nodes of a face with a field: all, or the corners.  Raises StudyError."""
+    kind, nodes = faces
+    defined = (dofs[nodes] >= 0).all(axis=0)
+    corners = CELLS[kind].corners
+    if defined.all():
+        return len(defined)
+    if defined[:corners].all() and not defined[corners:].any():
+        return corners
+    raise StudyError(f"{request.name!r}: {name!r} is not everywhere on both sides")
+
+
+def _moves(definition: ProblemDefinition, request: ContactRequest) -> bool:
+    """True if the bodies have displacements; those of a law need none.
+
+    Raises StudyError for displacements that no page of a body has.
+    """
     contacts = {label for other in definition.contacts for label in other.labels}
     bodies = [block for label, block in definition.blocks.items() if label not in contacts]
     existing = list(dict.fromkeys(s.name for b in bodies for s in b.slots if s.node is not None))
+    if request.law is not None and not request.named and not {*request.names} & {*existing}:
+        return False
     for name in request.names:
         if name not in existing:
             raise StudyError(
                 f"{request.name!r}: no unknown {name!r}{did_you_mean(name, existing)}; at nodes: "
                 f"{join_names(existing)}; give of=(...), the displacements along x and y"
             )
+    return True
 
 
 def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
@@ -109,6 +214,9 @@ def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
     assembler, blocks, contacts_with_stiffness = system.assembler, dict(system.blocks), []
     for request in definition.contacts:
         contact = contacts[request.name]
+        if isinstance(contact, LawContact):
+            contacts_with_stiffness.append(contact)
+            continue
         rho = [_rho(system, request, contact, side, stiffness) for side in contact.sides]
         for label, values in zip(request.labels, rho, strict=True):
             data = {**blocks[label].data, "rho": values}
@@ -152,7 +260,11 @@ def weighted(
 
 
 def _rho(
-    system: System, request: ContactRequest, contact: AnyContact, side: ContactSide, K: Array
+    system: System,
+    request: ContactRequest,
+    contact: Contact | FaceContact,
+    side: ContactSide,
+    K: Array,
 ) -> Array:
     """Stiffness per area, (n,), about that of the softer of the two bodies beneath a side."""
     if request.stiffness is not None:
@@ -175,7 +287,7 @@ def _rho(
     return np.asarray((_SOFTEST if curved else _SOFTER) * rho)
 
 
-def _per_area(contact: AnyContact, faces: object, K: Array) -> Array:
+def _per_area(contact: Contact | FaceContact, faces: object, K: Array) -> Array:
     """Entries of the diagonal of K over the area of each node, (points,); zero elsewhere."""
     area = np.zeros(len(contact.points))
     for kind, nodes in faces:  # type: ignore[attr-defined]

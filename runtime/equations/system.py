@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.contact.pair_law import LawContact, PairLawKernel
 from softehl.runtime.contact.search import ContactProblem, StateDependentBlocks
 from softehl.runtime.definition.problem_definition import (
     Block,
@@ -136,7 +137,8 @@ class System:
         dict of str to array (cells, points, k)
             Block -> values.
         """
-        return {b.name: b.initial for b in self.blocks.values() if b.initial is not None}
+        histories = {b.name: b.initial for b in self.blocks.values() if b.initial is not None}
+        return histories | {c.name: c.history for c in contacts_with_history(self)}
 
     def quasi_static_step(self, t: float, old: Array, histories: Mapping[str, Array]) -> Step:
         """Return a quasi-static step.
@@ -206,6 +208,10 @@ class System:
                 for name in names:
                     state[:, :, block.kernel.point_data.index(name)] = fields[f"new_{name}"]
                 after[block.name] = state
+        for contact in contacts_with_history(self):
+            assert isinstance(problem, ContactProblem)
+            contact = replace(contact, history=previous[contact.name])
+            after[contact.name] = contact.committed(x, problem.old, problem.parameters)
         return after
 
     def problem(self, step: Step) -> Problem:
@@ -263,6 +269,8 @@ class System:
                     **{"t": step.t, "factor": step.factor},
                     "acceleration": step.acceleration,
                 }
+                if isinstance(block.kernel, PairLawKernel):
+                    parameter_values = block.kernel.values
             else:
                 parameter_values = {
                     **{"rate": step.rate, "dt": step.dt, "acceleration": step.acceleration},
@@ -280,7 +288,13 @@ class System:
         layout = self.numbering.layout
         posed_on: dict[str, Any] = {"fixed": fixed, "values": values}
         if self.contacts:
-            posed_on |= {"contacts": self.contacts, "old": step.old}
+            contacts = tuple(
+                replace(c, history=step.histories[c.name])
+                if isinstance(c, LawContact) and c.name in step.histories
+                else c
+                for c in self.contacts
+            )
+            posed_on |= {"contacts": contacts, "old": step.old}
         kind = ContactProblem if self.contacts else Problem
         return kind(assembler, layout, parameters, **posed_on)
 
@@ -346,3 +360,9 @@ class System:
             prescribed[dofs], by[dofs] = values, k
         fixed = np.flatnonzero(by >= 0)
         return fixed, prescribed[fixed]
+
+
+def contacts_with_history(system: System) -> tuple[LawContact, ...]:
+    """Contacts by a law that has history."""
+    laws = [c for c in system.contacts if isinstance(c, LawContact)]
+    return tuple(c for c in laws if c.history_names)

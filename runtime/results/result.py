@@ -13,6 +13,7 @@ import numpy as np
 from softehl.errors import UnknownNameError
 from softehl.log import warn
 from softehl.runtime.arrays import Array, Integers, read_only
+from softehl.runtime.contact.pair_law import PairLawKernel, fields_of_law
 from softehl.runtime.definition.argument_checks import writable
 from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.loads import Spring, Tie
@@ -321,13 +322,22 @@ class Result:
         Returns
         -------
         dict of str to array (cells, points)
-            Field of the page (`m.fields(...)`) -> values; empty if the page declares none.
+            Field of the page (`m.fields(...)`) -> values; empty if the page declares none. Of a
+            contact by a law (points,), where it acts, with the place `x`, `y`, `z` of the points
+            and their undeformed `area`.
 
         Raises
         ------
         UnknownNameError
             There is no such block; a KeyError.
         """
+        law = [
+            b
+            for b in self.problem.assembler.blocks
+            if isinstance(b.kernel, PairLawKernel) and b.name.startswith(f"{block}: ")
+        ]
+        if law:
+            return fields_of_law(law, self.point.solution.x, self.problem.parameters)
         self._block(block)
         comm = self.system.comm
         return {n: comm.gather_cells(block, v) for n, v in self._local_fields(block).items()}

@@ -83,8 +83,9 @@ class Tape:
         rubbing = any(contact.friction for contact in system.definition.contacts)
         if rubbing and not np.array_equal(self.step.old, system.at_rest()):
             raise StudyError(
-                "friction between bodies is not followed through several steps: derivatives need "
-                "solve(steps=1) from rest, or contacts without friction"
+                "friction between bodies is not followed through several steps, nor is a law of "
+                "contact without an energy of the present state: derivatives need solve(steps=1) "
+                "from rest, or contacts without friction"
             )
         if not depends_on_previous(system):
             return [self]

@@ -53,6 +53,7 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     ),
     (("tied halves",), lambda at: at.solver == "amg", "multigrid needs"),
     (("tied halves",), lambda at: at.constraint == "tied sides", "tied in a circle"),
+    (("law of contact",), _moves, "a contact by law=... has no march with inertia"),
     (("contact",), lambda at: at.solver == "amg", "multigrid needs"),
 )
 """What a user reads."""

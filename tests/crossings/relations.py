@@ -21,6 +21,7 @@ from softehl.runtime.mesh.mesh import Predicate
 from softehl.runtime.mesh.readers.meshio import import_meshio
 from softehl.runtime.results.result import Result
 from tests.crossings.features import FAST, LAWS, SIZE, Problem
+from tests.runtime.contact_laws import cohesion
 
 Pairs = Iterator[tuple[Array | float, Array | float]]
 
@@ -338,7 +339,7 @@ def homogeneous(at: Problem) -> Pairs:
     yield np.array([state.A[:, :, k, 1] for k in range(2)]), np.array(slopes)
 
 
-def pressed(at: Problem) -> Pairs:
+def pressed(at: Problem, **contact: Any) -> Pairs:
     """Two bodies in contact: what is loaded, what touches and what holds are one force."""
     if at.dimension == 2:
         upper = Mesh.rectangle(1, 1, cells=(2, 2)).map(lambda x: x + np.array([0, 1]))
@@ -349,7 +350,7 @@ def pressed(at: Problem) -> Pairs:
     study = Study(Mesh.union(upper=upper, lower=lower))
     for name in ("upper", "lower"):
         at.properties.add(study, name, name)
-    study.contact("upper:bottom", "lower:top")
+    study.contact("upper:bottom", "lower:top", **contact)
     down = at.axes[-1]
     study.fix("lower:bottom", **{down: 0.0})
     for name in at.axes[:-1]:
@@ -360,6 +361,11 @@ def pressed(at: Problem) -> Pairs:
     fields = result.fields("contact")
     yield float((fields["pressure"] * fields["area"]).sum()), 0.03
     yield result.reaction("lower:bottom")[down], 0.03
+
+
+def pressed_by_law(at: Problem) -> Pairs:
+    """The same by a law of contact."""
+    return pressed(at, law=cohesion, s=1.0, d=0.1)
 
 
 def written(at: Problem) -> Pairs:
@@ -546,6 +552,13 @@ RELATIONS: dict[str, Relation] = {
         quick=("analysis",),
         tolerance=1e-6,
         looser={"midpoint": 1e-2, "newmark": 3e-3, "generalised-alpha": 3e-3, "explicit": 1e-2},
+    ),
+    "law of contact": Relation(
+        pressed_by_law,
+        ("analysis", "law", "solver"),
+        (("analysis", "law"),),
+        quick=("analysis",),
+        tolerance=1e-6,
     ),
     "files": Relation(written, ("cell", "law"), quick=(), tolerance=1e-12),
 }

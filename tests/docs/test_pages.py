@@ -52,7 +52,7 @@ LONG = {
     *("A rubber on any cell", "Cook's membrane", "Two bodies", "A page with products", "report"),
     *("Ogden: principal stretches in three dimensions", "A viscoplastic steel"),
     *("Gent: a rubber that locks", "A beam that swings", "Interior penalty"),
-    *("Heat: weak forms and rates", "Unknowns of one element"),
+    *("Heat: weak forms and rates", "Unknowns of one element", "A law of your own"),
     *("Press a rigid sphere into a body?", "A convex network of two invariants"),
     *(name for name in PARTS if "first-seal" in name),
     *(f"gallery/{entry}" for entry in ("contact", "cook", "enhanced", "fbar", "fit", "fracture")),
