@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from softehl.cases.harness.case_file import read_case
+from softehl.cases.harness.errors import BadInput
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.catalogue import as568, ring, series
@@ -272,6 +273,25 @@ def test_rings_with_their_rubber() -> None:
     assert made(ring="MS28775-210", rod=19.0, mu=2.0, material="neo-hooke").shear_modulus == 2.0
     with pytest.raises(ValueError, match='is of NBR 70, and compound = "FKM 75"'):
         made(ring="MS28775-210", rod=19.0, material="FKM 75")
+
+
+def test_a_ring_for_another_rod_is_named() -> None:
+    """As the ring of its catalogue and section that goes on this rod, or into this bore."""
+    for given, other in {
+        ("AS568-210", "rod=30"): "AS568-217",
+        ("P20", "bore=40"): None,
+        ("P30", "rod=45"): "P44",
+        ("36x4", "rod=50"): "49x4",
+        ("36x4", "bore=60"): "52x4",
+    }.items():
+        with pytest.raises(BadInput) as caught:
+            read_case("oring", SHIPPED, [f"ring={given[0]}", given[1]])
+        said = str(caught.value)
+        assert (f'ring = "{other}" fits' in said) if other else "fits" not in said, said
+        if other:
+            fitting = read_case("oring", SHIPPED, [f"ring={other}", given[1]]).parameters
+            assert isinstance(fitting, Seal)
+            assert not [*handbook(fitting)], other
 
 
 def test_small_and_large_sections_have_a_gland_by_rule() -> None:

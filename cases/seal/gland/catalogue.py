@@ -82,6 +82,27 @@ def ring_gland(name: str | None, section: float, kind: Kind, shape: str = "round
     return gland(section, kind, shape)
 
 
+def ring_for(name: str, inner: float) -> str | None:
+    """The ring of the same catalogue and section as the one of a name, for another inside, mm.
+
+    Its inside is within 5 % of what is asked for; None where there is none.
+    """
+    ring_name = read_ring(name)
+    if ring_name.outer is not None:
+        return None
+    found = ring(name)
+    if ring_name.code is None and ring_name.number is None and ring_name.inch is None:
+        return f"{round(inner):g}x{found.section_diameter:g}" if inner >= 1.0 else None
+    letter = ring_name.code[0] if ring_name.code else ""
+    names = {code: r for code, r in series().items() if code[0] == letter}
+    same = names or {r.name: r for r in as568().values()}
+    close = {n: r for n, r in same.items() if r.section_diameter == found.section_diameter}
+    best = min(close, key=lambda n: abs(close[n].inner_diameter - inner), default=None)
+    if best is None or abs(close[best].inner_diameter / inner - 1.0) > 0.05:
+        return None
+    return best
+
+
 @cache
 def as568() -> dict[int, Ring]:
     """The 349 general sizes by number, mm."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softehl.cases.seal.gland.catalogue import ring_for
 from softehl.cases.seal.gland.records import Discretisation, Gland, Solid
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.sections.section_keys import is_mesh
@@ -171,7 +172,10 @@ def _ring_fits_the_rod(p: Gland) -> None:
             f"{'larger' if stretch > 0.0 else 'smaller'} than the ring outside, "
             f"{-p.inner_diameter:g} mm"
         )
-    raise ValueError(f"{message}; allowed are -10 to 20 %")
+    fits = -(p.rod_diameter + 2.0 * p.section_diameter) if p.piston else p.rod_diameter / 1.02
+    other = ring_for(p.ring, fits) if p.ring else None
+    hint = f'; of its section ring = "{other}" fits' if other else ""
+    raise ValueError(f"{message}; allowed are -10 to 20 %{hint}")
 
 
 def _section_is_between_the_walls(p: Gland) -> None:
