@@ -157,6 +157,10 @@ def test_the_modulus_of_a_named_rubber_in_the_cold() -> None:
     assert seal(**{**cold.settled(), "mu": 5.0}).shear_modulus == 5.0
     warm = seal(material="NBR 70", temperature=80.0, modulus_rule="entropic")
     assert warm.shear_modulus / at_room == pytest.approx(353.15 / 296.15)
+    by_oil = seal(material="NBR 70", oil="HVLP 32 at -15 degC")
+    assert by_oil.shear_modulus == cold.shear_modulus
+    assert Seal(**by_oil.model_dump()) == by_oil
+    assert "becomes a glass at -30" in refused(material="NBR 70", oil="HVLP 32 at -35 degC")
     given = seal(material="FKM 75", temperature=-25.0, glass_transition=-40.0)
     assert given.shear_modulus > 1.5 * seal(material="FKM 75").shear_modulus
     same = seal(material="FKM 75", temperature=-25.0, modulus_rule="constant")

@@ -406,9 +406,22 @@ def test_fluids_that_are_no_mineral_oils(
     assert "density" not in " ".join(CASE.assumed(Seal(**own), own))
 
 
+def test_two_viscosities_of_a_named_fluid() -> None:
+    """A water-glycol by its data sheet: its viscosities, and what is typical of the rest."""
+    two = "46 cSt at 40 degC, 12 cSt at 100 degC"
+    p = typed(f"oil=HFC, {two}", "temperature=40")
+    assert p.viscosity == pytest.approx(46.0 * density(40.0, 1080.0) * 1e-12)
+    assert p.pressure_viscosity == pytest.approx(0.135 * barus(p.viscosity))
+    (told,) = (line for line in said(p) if "typical of a water-glycol" in line)
+    assert "viscosity index" not in told
+    assert typed(f"oil={two}", "temperature=40").pressure_viscosity == pytest.approx(
+        barus(46.0 * density(40.0) * 1e-12)
+    )
+
+
 def test_what_a_fluid_does_to_rubber_is_said() -> None:
     hot = " ".join(CASE.warnings(typed("oil=HFC 46 at 70 degC", "material=PU 95")))
-    assert "PU does not resist HFC 46 at 70 degC, a water-glycol" in hot
+    assert "PU does not resist HFC, a water-glycol" in hot
     assert "HFC fluids are used to 60 degC" in hot
     fkm = " ".join(CASE.warnings(typed("oil=HFDR 46 at 50 degC", "material=FKM 75")))
     assert "resist" not in fkm

@@ -20,7 +20,7 @@ from softehl.cases.seal.gland.rubbers.conditions import (
 )
 from softehl.cases.seal.gland.rubbers.hardness import shore_band, youngs_modulus
 from softehl.cases.seal.gland.sections.section_keys import ROUND, dimensions
-from softehl.cases.seal.gland.trade.oil_names import IMPROVED, POUR, Family, read_oil_name
+from softehl.cases.seal.gland.trade.oil_names import IMPROVED, POUR, Family, OilName, read_oil_name
 from softehl.cases.seal.gland.trade.parse_terms import understood
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.rubber_names import RANGES, read_rubber
@@ -133,8 +133,8 @@ def _unusual(p: Seal) -> Iterator[str]:
         )
     if p.swelling is not None and p.shore_A is None:
         yield "swelling: the modulus is taken as that of the swollen rubber, not changed by it"
-    if p.oil and read_oil_name(p.oil).grade:
-        yield from _not_resistant(p, read_oil_name(p.oil).family)
+    if p.oil and ((oil := read_oil_name(p.oil)).grade or oil.family):
+        yield from _not_resistant(p, oil.family)
     if "speeds" in type(p).model_fields and max(p.speeds) > FASTEST:
         yield (
             f"a speed of {max(p.speeds):g} mm/s: reciprocating seals are used to {FASTEST:g} mm/s, "
@@ -157,7 +157,7 @@ def _not_resistant(p: Seal, family: Family | None) -> Iterator[str]:
             yield f"{p.polymer} swells in mineral oil, and its modulus falls; {p.oil} is one"
         return
     if p.polymer in family.attacks:
-        yield f"{p.polymer} does not resist {p.oil}, a {family.kind}: it swells or decays"
+        yield f"{p.polymer} does not resist {family.name}, a {family.kind}: it swells or decays"
     if family.highest is not None and (p.temperature or 0.0) > family.highest:
         yield (
             f"temperature = {p.temperature:g} degC: {family.name} fluids are used to "
@@ -346,12 +346,12 @@ def _kind(p: Gland) -> tuple[str, bool]:
     return "its standard gland", True
 
 
-def _typical(p: Seal, family: Family, keys_set: frozenset[str]) -> Iterator[str]:
+def _typical(p: Seal, name: OilName, family: Family, keys_set: frozenset[str]) -> Iterator[str]:
     """Values taken from the family of a fluid."""
     texts = []
     if "oil_density" not in keys_set:
         texts.append(f"the density {family.density:g} kg/m3 at 15 degC")
-    if p.oil and read_oil_name(p.oil).index is None:
+    if name.index is None and not name.points:
         texts.append(
             f"the viscosity index {family.index:g}"
             if family.index is not None
@@ -371,15 +371,16 @@ def _fluids(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
         yield f"a sealed pressure of {p.sealed_pressure:g} MPa"
     if not keys_set & {"viscosity", "oil"}:
         yield f"an oil of {1e9 * p.viscosity:.3g} mPa s"
-    if p.oil is not None and read_oil_name(p.oil).points:
+    name = read_oil_name(p.oil) if p.oil is not None else None
+    if name and name.family:
+        yield from _typical(p, name, name.family, keys_set)
+    elif name and name.points:
         texts = [] if "oil_density" in keys_set else [f"the density {DENSITY:g} kg/m3 at 15 degC"]
         if not keys_set & {"pressure_viscosity", "roelands"}:
             texts.append(f"the pressure-viscosity coefficient {p.pressure_viscosity:.3g} 1/MPa")
         if texts:
             yield f"{' and '.join(texts)}, of a mineral oil"
-    elif p.oil is not None and (family := read_oil_name(p.oil).family):
-        yield from _typical(p, family, keys_set)
     elif "viscosity" in keys_set and not keys_set & {"pressure_viscosity", "roelands"}:
         yield f"a pressure-viscosity coefficient of {p.pressure_viscosity:g} 1/MPa"
-    if p.oil and read_oil_name(p.oil).improved:
+    if name and name.improved:
         yield f"a viscosity index of {IMPROVED:g}, the least that HVLP oils have (DIN 51524-3)"

@@ -96,8 +96,8 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
     @classmethod
     def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
         """Diameters and width from ring, rod, squeeze and gland; rubber and oil.  ValueError."""
-        values = fitted(with_limits(dict(given)))
-        return with_oil(with_rubber(with_regions(values)))
+        values = with_oil(fitted(with_limits(dict(given))))  # an oil may name the temperature
+        return with_rubber(with_regions(values))
 
     @property
     def surfaces(self) -> SurfacePair:

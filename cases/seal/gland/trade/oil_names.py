@@ -81,7 +81,7 @@ class OilName:
 
     index: viscosity index, None where it is that of a mineral oil. temperature: degC, None where
     the name does not say it. improved: whether the index is the least of HVLP oils. family: None of
-    a mineral oil, and of one by two viscosities.
+    a mineral oil, and where two viscosities are all that is said.
     """
 
     grade: int | None = None
@@ -107,6 +107,7 @@ _GRADE = form(
     rf"(?P<grade>\d{{1,5}})(?:[ ,(]*VI ?=? ?(?P<index>{NUMBER})\)?)?{_AT}"
 )
 _POINT = form(rf"(?P<nu>{NUMBER}) ?(?:cSt|mm\^?2/s) ?(?:at|@|/|bei)? ?{_WARM}")
+_OF_FAMILY = form(rf"(?P<family>{_FAMILY})[ :,;]+(?P<points>.*cSt.*|.*mm.*2/s.*)")
 _GREASE = form(r".*\b(?:grease|NLGI|Fett|lithium soap|molykote)\b.*")
 _OTHER = form(
     r"(?:ISO )?(?P<kind>HV|HFA[ES]?|HFB|HFC|HFD-?[RU]?|HEES|HETG|HEPG|HEPR|ATF|PAO|DOT ?\d|SAE)\b.*"
@@ -120,13 +121,16 @@ def read_oil_name(name: str) -> OilName:
     match = _GRADE.fullmatch(text)
     if match and any(match[k] for k in ("plain", "improved", "mineral", "iso", "family")):
         return _of_grade(match)
-    points = [_POINT.fullmatch(part.strip()) for part in re.split(r"[;,]| and ", text)]
+    family, measured = None, text
+    if of_family := _OF_FAMILY.fullmatch(text):
+        family, measured = _family(of_family["family"]), of_family["points"]
+    points = [_POINT.fullmatch(part.strip()) for part in re.split(r"[;,]| and ", measured)]
     if len(points) == 2 and all(points):
         pairs = tuple((float(p["nu"]), _celsius(p)) for p in points if p)
         for nu, at in pairs:
             if not (0.7 < nu < 1e6 and -60.0 <= at <= 300.0):
                 raise refused("oil", name, f": {nu:g} cSt at {at:g} degC is out of range", TWO)
-        return OilName(points=pairs)
+        return OilName(points=pairs, family=family)
     raise _unknown(name, text)
 
 
@@ -147,14 +151,17 @@ def _of_grade(match: re.Match[str]) -> OilName:
     improved = bool(match["improved"] and not match["index"])
     index = float(match["index"]) if match["index"] else IMPROVED if improved else None
     at = _celsius(match) if match["at"] else None
-    family = None
-    if said := match["family"]:
-        family = next(
-            FAMILIES[row["family"]]
-            for row in _FAMILY_ROWS
-            if re.fullmatch(f"{row['family']}|{row['also']}", said, re.IGNORECASE)
-        )
+    family = _family(match["family"]) if match["family"] else None
     return OilName(int(match["grade"]), index, temperature=at, improved=improved, family=family)
+
+
+def _family(said: str) -> Family:
+    """The fluids that a word of `_FAMILY` means."""
+    return next(
+        FAMILIES[row["family"]]
+        for row in _FAMILY_ROWS
+        if re.fullmatch(f"{row['family']}|{row['also']}", said, re.IGNORECASE)
+    )
 
 
 def _unknown(name: str, text: str) -> Exception:
