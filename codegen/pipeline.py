@@ -48,7 +48,12 @@ from softehl.codegen.emit import (
 )
 from softehl.codegen.emit.code_motion import Schedule, is_straight, schedule, straight_line
 from softehl.codegen.emit.instruction_scheduling import order_instructions, order_plan
-from softehl.codegen.emit.points import cell_constants, point_kernel, sum_factored_product
+from softehl.codegen.emit.points import (
+    cell_constants,
+    coarse_tangent,
+    point_kernel,
+    sum_factored_product,
+)
 from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_kernel import Choice, choose
 from softehl.codegen.emit.points.point_layout import Layout, Needs
@@ -103,7 +108,8 @@ class KernelSource:
     design: a second C file with the tasks of sensitivities, empty where none is offered, or where
     they call the same routines as the others. shared:
     files that other families may have, too, by name. cached: numbers that products by sum
-    factorisation keep at a point, 0 where there are none.
+    factorisation keep at a point, 0 where there are none. coarse: unknowns of the cell of the
+    next lower order, of which there is a tangent beside these products.
     """
 
     definition: Definition
@@ -112,6 +118,7 @@ class KernelSource:
     design: str = ""
     shared: Mapping[str, str] = field(default_factory=dict)
     cached: int = 0
+    coarse: int = 0
 
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
@@ -170,11 +177,15 @@ def _with_action(made: KernelSource) -> KernelSource:
         return made
     outputs, plan, called = _ordered(layout, Task.PRODUCT)
     action = sum_factored_product.Factored(layout, outputs, plan)
-    preamble = simd_routines.texts(layout.site, dict.fromkeys(called))
-    text = action.text(preamble)
-    text = action.text([*simd_printer.wrappers(text), *preamble])
+    moduli, moduli_plan, also = _ordered(layout, Task.TANGENT, _moduli_alone(layout.site))
+    names = action.cache.names
+    lower = coarse_tangent.CoarseTangent(layout, moduli, moduli_plan, names)
+    coarse = lower.text()
+    preamble = simd_routines.texts(layout.site, dict.fromkeys([*called, *also]))
+    text = action.text(preamble, coarse)
+    text = action.text([*simd_printer.wrappers(text), *preamble], coarse)
     shared = {**made.shared, f"{d.name}_action.c": text}
-    return replace(made, shared=shared, cached=len(action.cache.names))
+    return replace(made, shared=shared, cached=len(names), coarse=lower.size)
 
 
 def form(d: Definition) -> Choice:
@@ -201,6 +212,12 @@ def _form(d: Definition) -> tuple[Choice, Attempt | None]:
 def _moduli(site: Definition, task: str) -> Attempt:
     """Outputs of a task at a point."""
     return _attempt(site, Variant("at a point", point_outputs.outputs(site, task)), unrolled=True)
+
+
+def _moduli_alone(site: Definition) -> Attempt:
+    """Moduli at a point without the fluxes."""
+    entries = [x for x in point_outputs.outputs(site, Task.TANGENT) if x.column is not None]
+    return _attempt(site, Variant("moduli at a point", entries), unrolled=True)
 
 
 def _at_points(d: Definition, tasks: Sequence[str], tangent: Attempt | None) -> KernelSource:

@@ -79,7 +79,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         **({"functions": list(d.functions)} if d.functions else {}),
         **({"cell": d.cell} if d.cell else {}),
         **({"arrays": {a.name: _array(a) for a in d.arrays}} if d.arrays else {}),
-        **({"kept": kernel.cached} if kernel.cached else {}),
+        **({"kept": kernel.cached, "coarse": kernel.coarse} if kernel.cached else {}),
         "conditions": [[c.name, c.relation, c.bound, c.where] for c in d.conditions],
         "fields": [name for name, _ in d.fields],
         "unrolled": any(f.best.unrolled for f in kernel.functions.values()),

@@ -213,13 +213,17 @@ class ElementBlock:
         width = len(scatter) // n
         for first in range(0, n, step):
             part = slice(first, first + step)
-            data = None if self.data is None else self.data[part]
-            history = None if self.point_data is None else self.point_data[part]
-            coordinates, dofs = self.coordinates[part], self.dofs[part]
-            piece = replace(self, coordinates=coordinates, dofs=dofs, data=data, point_data=history)
+            piece = self.part(part)
             if isinstance(self.kernel, MassKernel):
                 piece = replace(piece, kernel=self.kernel.part(part))
             yield piece, scatter[width * first : width * (first + step)]
+
+    def part(self, elements: slice | Integers) -> ElementBlock:
+        """Return the block with some of its elements."""
+        data = None if self.data is None else self.data[elements]
+        history = None if self.point_data is None else self.point_data[elements]
+        coordinates, dofs = self.coordinates[elements], self.dofs[elements]
+        return replace(self, coordinates=coordinates, dofs=dofs, data=data, point_data=history)
 
     def since(self, x: Array) -> ElementBlock:
         """Return the block in the next step: data u_old1, ... have the values of u1, ...

@@ -17,7 +17,7 @@ from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.discretisation.constraints import Constraints, tie_dofs
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Tie
-from softehl.runtime.discretisation.matrix_free_products import ElementProduct
+from softehl.runtime.discretisation.matrix_free_products import ElementProduct, require_product
 from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.linear.coarse_grid_solver import coarse_solver
@@ -129,15 +129,13 @@ class MatrixFreeOperator:
             if parameters is None or not len(block.dofs) or isinstance(block.kernel, Tie):
                 continue
             if block.name in levels.numberings:
-                products.append(
-                    ElementProduct.of(block, x, parameters, levels.numberings[block.name])
-                )
-                lower = lower + _projected(
-                    block, x, parameters, levels, ties.constraints.free, diagonal
-                )
+                product = ElementProduct.of(block, x, parameters, levels.numberings[block.name])
+                products.append(product)
+                coarse, own = coarse_matrix(block, product, x, levels, ties.constraints.free)
+                lower, diagonal = lower + coarse, diagonal + own
             else:
                 tangents = block.tangent(x, parameters)[1]
-                loads_matrix = loads_matrix + _matrix(block.dofs, tangents, len(x))
+                loads_matrix = loads_matrix + assembled(block.dofs, tangents, len(x))
         diagonal += loads_matrix.diagonal()
         order = levels.unknowns[0]
         if loads_matrix.nnz:
@@ -289,30 +287,78 @@ class _Bound:
         return np.asarray(root * around + abs(self.tangent.ties.matrix) @ x)
 
 
-def _projected(
+def coarse_matrix(
+    block: ElementBlock, product: ElementProduct, x: Array, levels: MultigridLevels, free: Flags
+) -> tuple[csr_array, Array]:
+    """The matrix of a block at the next lower order, and the diagonal of K, (n,).
+
+    Both follow from the moduli at the points. Where a constrained unknown stands between free ones
+    of the lower order, they see only a part of K: there tangents of elements are projected.
+    """
+    name, n = block.name, len(free)
+    numbering, dofs = levels.numberings[name], levels.lower[name]
+    diagonals, tangents = product.coarse(require_product(block))
+    assert tangents.shape[1] == dofs.shape[1], "the orders of the next level differ"
+    repeated = numbering.repeated
+    diagonals[repeated] = 0.0
+    tangents[repeated] = 0.0
+    rows = block.dofs[numbering.order].ravel()
+    diagonal = _summed(rows, diagonals, n)
+    moving = free[levels.unknowns[1]][dofs]
+    split = np.flatnonzero(_are_split(block, levels.transfers[name].matrix(), free, moving))
+    mask = moving[numbering.order].astype(np.float64)
+    mask[np.isin(numbering.order, split)] = 0.0
+    constrained = np.flatnonzero((mask == 0.0).any(axis=1))
+    some = mask[constrained]
+    tangents[constrained] *= some[:, :, None] * some[:, None, :]
+    pattern = levels.pattern(name)
+    matrix = csr_array(pattern.matrix(_summed(pattern.scatter[0], tangents, pattern.nnz)))
+    if len(split):
+        projected = projected_tangents(block, x, product.parameters, levels, free, split)
+        matrix = matrix + assembled(dofs[split], projected, pattern.size)
+    return matrix, diagonal
+
+
+def _summed(places: Integers, values: Array, size: int) -> Array:
+    """Sums (size,) of values at places."""
+    sums = np.bincount(places, weights=values.ravel(), minlength=size)
+    return np.asarray(sums, dtype=np.float64)
+
+
+def _are_split(block: ElementBlock, P: Array, free: Flags, moving: Flags) -> Flags:
+    """Elements (n,) of which a constrained unknown depends on a free one of the lower order.
+
+    moving: (n, k) free unknowns of the lower order.
+    """
+    constrained = ~free[block.dofs]
+    some = np.flatnonzero(constrained.any(axis=1))
+    depends = constrained[some].astype(np.float64) @ (np.abs(P) > 1e-14) > 0
+    split = np.zeros(len(constrained), dtype=bool)
+    split[some] = (depends & moving[some]).any(axis=1)
+    return split
+
+
+def projected_tangents(
     block: ElementBlock,
     x: Array,
     parameters: Array,
     levels: MultigridLevels,
     free: Flags,
-    diagonal: Array,
-) -> csr_array:
-    """The matrix at the lower order, and the diagonal of K, from the tangents of elements."""
-    P, dofs = levels.transfers[block.name].matrix(), levels.lower[block.name]
+    elements: Integers,
+) -> Array:
+    """Tangents (m, k, k) of elements at the lower order, of their free unknowns alone."""
+    P, dofs = levels.transfers[block.name].matrix(), levels.lower[block.name][elements]
     projected, at = np.empty((len(dofs), P.shape[1], P.shape[1])), 0
-    for piece, _ in block.pieces(np.empty(0, dtype=np.int64)):
+    for piece, _ in block.part(elements).pieces(np.empty(0, dtype=np.int64)):
+        masked = P[None] * free[piece.dofs].astype(np.float64)[:, :, None]
         tangents = piece.tangent(x, parameters)[1]
-        np.add.at(diagonal, piece.dofs, np.einsum("nii->ni", tangents))
-        mask = free[piece.dofs].astype(np.float64)
-        masked = P[None] * mask[:, :, None]
-        projected[at : at + len(mask)] = np.swapaxes(masked, 1, 2) @ (tangents @ masked)
-        at += len(mask)
+        projected[at : at + len(masked)] = np.swapaxes(masked, 1, 2) @ (tangents @ masked)
+        at += len(masked)
     mask = free[levels.unknowns[1]][dofs].astype(np.float64)
-    projected *= mask[:, :, None] * mask[:, None, :]
-    return _matrix(dofs, projected, len(levels.unknowns[1]))
+    return projected * mask[:, :, None] * mask[:, None, :]
 
 
-def _matrix(dofs: Integers, tangents: Array, size: int) -> csr_array:
+def assembled(dofs: Integers, tangents: Array, size: int) -> csr_array:
     """Assembled from the matrices (n, k, k) of elements."""
     k = dofs.shape[1]
     rows, columns = np.repeat(dofs, k, axis=1).ravel(), np.tile(dofs, k).ravel()

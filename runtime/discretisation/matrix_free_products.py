@@ -107,6 +107,13 @@ class ElementNumbering:
         )
         return cls(order, lanes, unknowns, at, size, (*runs,), shared_run)
 
+    @property
+    def repeated(self) -> Flags:
+        """(m,) elements of `order` that only fill up a group."""
+        repeated = np.ones(len(self.order), dtype=bool)
+        repeated[np.unique(self.order, return_index=True)[1]] = False
+        return repeated
+
     def vector(self) -> Array:
         """Zeros for the unknowns node by node, and for what is read and written behind them."""
         return np.zeros(self.size + self.unknowns.shape[1] + 3)
@@ -207,6 +214,26 @@ class ElementProduct:
         else:
             list(self._pool.map(run, self.numbering.runs))
             run(self.numbering.shared_run)
+
+    def coarse(self, kernel: Kernel) -> tuple[Array, Array]:
+        """Diagonals (m, ndof), and tangents (m, k, k) of the k unknowns of the next lower order.
+
+        Elements are in the order of the numbering. They follow from what is kept at the points.
+        """
+        m = len(self.numbering.order)
+        diagonals = np.empty((m, len(kernel.unknowns)))
+        tangents = np.empty((m, kernel.coarse, kernel.coarse))
+        function, count = kernel.library.coarse(kernel.name), len(self.numbering.runs)
+        bounds = [k * (m // GROUP) // count * GROUP for k in range(count)] + [m]
+
+        def run(span: tuple[int, int]) -> None:
+            function(span, self.parameters, self.cached, diagonals, tangents)
+
+        if self._pool is None:
+            run((0, m))
+        else:
+            list(self._pool.map(run, pairwise(bounds)))
+        return diagonals, tangents
 
     def add(self, x: Array, y: Array) -> None:
         """y += K x for vectors of the whole system."""

@@ -6,7 +6,7 @@ Nodes of the lower order are nodes of the higher one: corners, or corners and mi
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +20,7 @@ from softehl.runtime.discretisation.matrix_free_products import (
     require_product,
 )
 from softehl.runtime.discretisation.near_nullspace import rigid_body_modes
+from softehl.runtime.discretisation.sparsity import Pattern, build_pattern
 from softehl.runtime.mesh.cells import CELLS, Cell
 
 LOWER = {2: 1, 3: 1, 4: 2, 5: 1, 6: 2}
@@ -100,6 +101,14 @@ class MultigridLevels:
     steps: tuple[csr_array, ...]
     components: int
     nullspace: Array
+    _patterns: dict[str, Pattern] = field(default_factory=dict)
+
+    def pattern(self, block: str) -> Pattern:
+        """Pattern of the matrix of a block at the first lower order; elements as numbered."""
+        if block not in self._patterns:
+            dofs = self.lower[block][self.numberings[block].order]
+            self._patterns[block] = build_pattern(self.steps[0].shape[1], [dofs])
+        return self._patterns[block]
 
     @classmethod
     def of(

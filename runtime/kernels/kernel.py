@@ -518,6 +518,7 @@ def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
         point_rates=entry.get("point_rates", False),
         cell=entry.get("cell", ""),
         kept=entry.get("kept", 0),
+        coarse=entry.get("coarse", 0),
         arrays=tuple(_array(n, a) for n, a in entry.get("arrays", {}).items()),
     )
 

@@ -80,7 +80,8 @@ class Family:
     whose new values the last fields are. internal: unknowns of one element alone. functions:
     parameters that are addresses of C functions; addresses: those that the page knows. cell: on
     which a page of fields stands. kept: numbers that products by sum factorisation keep at a point,
-    0 where the family has none. term_groups: arrays of equal lengths. term_history: names of
+    0 where the family has none. coarse: unknowns of the cell of the next lower order, whose
+    tangents follow from these numbers. term_groups: arrays of equal lengths. term_history: names of
     history of terms, each with the array whose length it has; lengths: of all arrays, once they
     are known and have given names to this history. point_rates: whether point data have rates.
     """
@@ -109,6 +110,7 @@ class Family:
     addresses: Mapping[str, FunctionAddress] = field(default_factory=dict, compare=False)
     cell: str = ""
     kept: int = 0
+    coarse: int = 0
     arrays: tuple[RunTimeArray, ...] = ()
     term_groups: tuple[tuple[str, ...], ...] = ()
     term_history: tuple[tuple[str, str], ...] = ()

@@ -36,6 +36,7 @@ _SIGNATURE = (
 _ACTION = (
     "(ptrdiff_t, ptrdiff_t, const double *, const double *, const int *, const double *, double *);"
 )
+_COARSE = "(ptrdiff_t, ptrdiff_t, const double *, const double *, double *, double *);"
 _ffi = cffi.FFI()
 _INTS = _ffi.typeof("int[]")
 _DOUBLES = _ffi.typeof("double[]")
@@ -48,6 +49,10 @@ order and the shapes are those of `codegen/abi.py`."""
 
 Action = Callable[[tuple[int, int], Array, Array, Any, Array, Array], None]
 """Elements (first, last), parameters, what was kept, node numbers, x, and y, which it adds to."""
+
+
+Coarse = Callable[[tuple[int, int], Array, Array, Array, Array], None]
+"""Elements (first, last), parameters, what was kept, and the diagonals and tangents it writes."""
 
 
 class KernelError(SoftehlError, RuntimeError):
@@ -127,6 +132,19 @@ class Library:
             begin, end = span
             numbers, data = _ffi.from_buffer(_INTS, index), (_pointer(parameters), _pointer(cached))
             function(begin, end, data[0], data[1], numbers, _pointer(x), _pointer(y))
+
+        return call
+
+    def coarse(self, kernel: str) -> Coarse:
+        """The C function of tangents at a lower order (`codegen.emit.points.coarse_tangent`)."""
+        name = f"softehl_{kernel}_coarse"
+        _declare(name, _COARSE)
+        function = getattr(self.loaded, name)
+
+        def call(
+            span: tuple[int, int], parameters: Array, cached: Array, diagonals: Array, low: Array
+        ) -> None:
+            function(*span, *map(_pointer, (parameters, cached, diagonals, low)))
 
         return call
 

@@ -1,7 +1,7 @@
 """The engine `matrix-free`: conjugate gradients with products, and multigrid in the order.
 
-The tangent of pages is never a matrix. At every Newton step the tangents of elements are evaluated
-once, for its diagonal and for the matrix of the next lower order.
+The tangent of pages is never a matrix, nor are those of elements. At every Newton step its diagonal
+and the matrix of the next lower order are made of the moduli at the points.
 """
 
 from __future__ import annotations

@@ -14,11 +14,14 @@ from softehl.codegen.language.weak_form import Page
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.matrix_free_operator import coarse_matrix, without
 from softehl.runtime.discretisation.matrix_free_products import (
     ElementNumbering,
     ElementProduct,
     NoProductError,
+    require_product,
 )
+from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.mesh.cells import CELLS
 from tests.codegen import field_pages
 
@@ -27,6 +30,16 @@ from tests.codegen import field_pages
 def rubber(m: Fields) -> None:
     """Gradients alone, and products."""
     field_pages.rubber.write(m)
+    m.offer(product=True)
+
+
+@softehl.page
+def convected(m: Fields) -> None:
+    """Values and gradients, a tangent that is not symmetric."""
+    T = m.scalar("T")
+    (k,) = m.parameters(k="conductivity")
+    m.weak(k * m.grad(T), m.grad(T))
+    m.weak(m.grad(T)[0] + 2 * T + T**2, T)
     m.offer(product=True)
 
 
@@ -102,6 +115,49 @@ def test_products_are_those_of_assembled_tangents(
     assert np.abs(other - wanted).max() > 1e-9 * size, "the state does not matter"
 
 
+@pytest.mark.parametrize(
+    ("page", "kind"),
+    [
+        *((rubber, kind) for kind in ("quad4", "quad9", "hex8")),
+        *(
+            pytest.param(rubber, kind, marks=pytest.mark.slow)
+            for kind in ("quad25", "hex27", "hex64", "hex125")
+        ),
+        (field_pages.heat, "quad16"),
+        (field_pages.creep, "quad9"),
+        (convected, "quad9"),
+    ],
+    ids=lambda value: getattr(value, "name", value),
+)
+@pytest.mark.parametrize("constrained", [0.0, 0.1])
+def test_matrices_of_the_next_order_are_those_of_projected_tangents(
+    page: Page, kind: str, constrained: float, rng: np.random.Generator
+) -> None:
+    """From moduli at the points, and as P' K P; the diagonal too. Constraints are anywhere."""
+    assembler, x, parameters = assembled(page, kind, rng)
+    block, points = assembler.block("b"), mesh_of(kind).points
+    names = list(dict.fromkeys(name for name, _ in require_product(block).places))
+    dofmap = {n: np.arange(len(points)) + len(points) * k for k, n in enumerate(names)}
+    free = rng.uniform(size=len(x)) >= constrained
+    K = assembler.linearise(x, {"b": parameters})[1]
+    for threads in (1, 2):
+        levels = MultigridLevels.of(
+            points, dofmap, [block], order=CELLS[kind].order, size=len(x), threads=threads
+        )
+        numbering = levels.numberings["b"]
+        product = ElementProduct.of(block, x, parameters, numbering)
+        A, diagonal = coarse_matrix(block, product, x, levels, free)
+        P = without(levels.steps[0], free[levels.unknowns[0]])
+        R = without(P.T.tocsr(), free[levels.unknowns[1]])
+        fine = K.tocsr()[levels.unknowns[0]][:, levels.unknowns[0]]
+        wanted = R @ fine @ R.T
+        assert abs(A - wanted).max() < 1e-12 * abs(wanted).max()
+        assert np.abs(diagonal - K.diagonal()).max() < 1e-12 * np.abs(diagonal).max()
+    product = ElementProduct.of(block, 1.1 * x, parameters, numbering)
+    other, _ = coarse_matrix(block, product, 1.1 * x, levels, free)
+    assert page is convected or page.name == "heat" or abs(other - wanted).max() > 1e-9
+
+
 def test_a_failed_local_iteration_spoils_the_product(rng: np.random.Generator) -> None:
     assembler, x, parameters = assembled(field_pages.creep, "quad9", rng)
     block = assembler.block("b")
@@ -113,6 +169,14 @@ def test_a_failed_local_iteration_spoils_the_product(rng: np.random.Generator) -
     )
     assert np.isnan(found[block.dofs[3]]).all()
     assert np.isfinite(found).any()
+    numbering = ElementNumbering.of(block, 1)
+    product = ElementProduct.of(block, x, parameters, numbering)
+    diagonals, tangents = product.coarse(require_product(block))
+    spoilt = numbering.order == 3
+    assert np.isnan(diagonals[spoilt]).all()
+    assert np.isnan(tangents[spoilt]).all()
+    assert np.isfinite(diagonals[~spoilt]).all()
+    assert np.isfinite(tangents[~spoilt]).all()
 
 
 def test_what_has_no_product_is_refused(rng: np.random.Generator) -> None:

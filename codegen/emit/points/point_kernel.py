@@ -211,7 +211,7 @@ _NAME = f"{PREFIX}_{STEM}"
 
 def file(layout: Layout, outputs: PointOutputs) -> tuple[str, str]:
     """Name of the function and text of its file."""
-    body = _body(layout, outputs)
+    body = assembly(layout, outputs)
     tables = "\n".join(cell_constants.used(layout, body, STEM))
     key = hashlib.sha256((tables + body).encode()).hexdigest()[:16]
     name = f"{_NAME}{layout.d.cell}_{key}"
@@ -233,7 +233,8 @@ def declaration(name: str, layout: Layout, outputs: PointOutputs) -> str:
     return f"void {name}(V (*restrict S)[{parent.size}], {more}double *restrict K)"
 
 
-def _body(layout: Layout, outputs: PointOutputs) -> str:
+def assembly(layout: Layout, outputs: PointOutputs) -> str:
+    """Statements that assemble tangents K of a group of elements from their moduli S."""
     out, parent = Lines(), Parent(layout, outputs)
     count = len(layout.d.unknowns) ** 2
     storage = "static _Thread_local " if count > _SHORT else ""  # a stack has no room for it

@@ -220,12 +220,14 @@ class Factored:
     outputs: PointOutputs
     plan: Schedule
 
-    def text(self, preamble: list[str]) -> str:
-        """C file. preamble: routines that the function of the point calls."""
+    def text(self, preamble: list[str], coarse: str) -> str:
+        """C file. preamble: routines that the functions of the point call. coarse: functions
+        that stand behind the product.
+        """
         point, _ = point_function.text(self.layout, Task.PRODUCT, self.outputs, self.plan)
         keep, action = self.cache.text(), self._action()
         tables = cell_constants.used(self.layout, keep)
-        pieces = [self._tables_of_lines(), point, keep, action]
+        pieces = [self._tables_of_lines(), point, keep, action, coarse]
         return c_source.source(self.layout.d, pieces, [*preamble, SUPPORT, *tables])
 
     @cached_property
