@@ -219,7 +219,18 @@ class ElementBlock:
             yield piece, scatter[width * first : width * (first + step)]
 
     def part(self, elements: slice | Integers) -> ElementBlock:
-        """Return the block with some of its elements."""
+        """Return the block with some of its elements.
+
+        Parameters
+        ----------
+        elements : slice or array of int
+            Numbers of the elements.
+
+        Returns
+        -------
+        ElementBlock
+            Block of these elements alone.
+        """
         data = None if self.data is None else self.data[elements]
         history = None if self.point_data is None else self.point_data[elements]
         coordinates, dofs = self.coordinates[elements], self.dofs[elements]
