@@ -26,6 +26,7 @@ from softehl.runtime.analyses.bifurcation import Bifurcation
 from softehl.runtime.analyses.buckling import Buckling
 from softehl.runtime.analyses.callbacks import Series
 from softehl.runtime.analyses.homogenisation import Cell
+from softehl.runtime.analyses.initial_state import at_rest
 from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.analyses.time_integrators import MethodName, TimeIntegrator
 from softehl.runtime.arrays import Array, Integers
@@ -524,6 +525,34 @@ class Study:
             There is no such element.
         """
         return explain_at(self.system(), element, block, t, x)
+
+    def integral(
+        self, expression: str, where: str | None = None, *, block: str | None = None
+    ) -> float:
+        """Return the integral of an expression at the initial state: a volume, a mass.
+
+        Parameters
+        ----------
+        expression : str
+            As of `Result.integral`.
+        where : str, optional
+            As of `Result.integral`.
+        block : str, optional
+            As of `Result.integral`.
+
+        Returns
+        -------
+        float
+            The integral.
+
+        Raises
+        ------
+        StudyError
+            As of `Result.integral`.
+        MeshError
+            As of `Result.integral`.
+        """
+        return at_rest(self._definition).integral(expression, where, block=block)
 
     def solve(
         self,

@@ -321,6 +321,47 @@ class Definition:
             point=None,
         )
 
+    def for_values(self, names: tuple[str, ...]) -> Definition:
+        """Return the model whose fields are values that the page names.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Names of `Model.define` and `Model.probe`, those of a material also without its name.
+
+        Returns
+        -------
+        Definition
+            With the task `fields`. Elements are compiled as a whole.
+
+        Raises
+        ------
+        ModelError
+            The page has no such name.
+        """
+        return replace(
+            self,
+            fields=tuple((name, self._value(name)) for name in names),
+            product=False,
+            pseudo_load=False,
+            fields_rate=False,
+            derivatives=(),
+            tasks=("fields",),
+            history=(),
+            term_updates=(),
+            point=None,
+        )
+
+    def _value(self, name: str) -> Node:
+        """Value that the page names.  Raises ModelError."""
+        known = {s.name: s.value for s in self.statements if s.name}
+        prefixed = [k for k in known if k.endswith(f"_{name}")]
+        of_material = [k for k in prefixed if self.name.startswith(k[: -len(name)])]
+        if name not in known and len(of_material) != 1:
+            shown = [k for k in known if not k.startswith(("parent_", "shape_"))]
+            raise ModelError(f"{self.name} has no value {name!r}; it names {', '.join(shown)}", "")
+        return known[name if name in known else of_material[0]]
+
     @property
     def page_point_data(self) -> int:
         """Number of data of a point that the page has, without their rates and adjoints."""

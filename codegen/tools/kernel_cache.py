@@ -43,6 +43,9 @@ CellKey: TypeAlias = "tuple[tuple[str, ...], str, bool, tuple[tuple[str, str], .
 parameters that become data or point data.
 """
 
+Variant: TypeAlias = "int | tuple[str, ...]"
+"""Order of derivatives, 0 for the kernels themselves, or names of values."""
+
 
 @dataclass(frozen=True)
 class Library:
@@ -62,12 +65,13 @@ def folder_of(
     source: Path | Definition | Page | Law,
     where: CellKey = ((), "", False, ()),
     *,
-    derivatives: int = 0,
+    derivatives: Variant = 0,
 ) -> Path:
     """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived).
 
     where: cells and geometry of weak forms, and whether materials are wanted. derivatives: 1 or 2
-    for the kernels of `Definition.for_derivatives` or `for_second_derivatives` instead.
+    for the kernels of `Definition.for_derivatives` or `for_second_derivatives` instead, names for
+    those of `Definition.for_values`.
     """
     folder = _folder_of(source, where, derivatives=derivatives)
     text = model_text.digest(model_text.sources(source)) if isinstance(source, Path) else ""
@@ -109,7 +113,9 @@ def definition_of(folder: Path, kernel: str) -> Definition | None:
     return next((d for d in definitions if d.name == kernel), None)
 
 
-def _folder_of(source: Path | Definition | Page | Law, where: CellKey, *, derivatives: int) -> Path:
+def _folder_of(
+    source: Path | Definition | Page | Law, where: CellKey, *, derivatives: Variant
+) -> Path:
     if derivatives:
         return _for_derivatives(source, where, derivatives)
     if not isinstance(source, Path):
@@ -138,8 +144,10 @@ def _folder_of(source: Path | Definition | Page | Law, where: CellKey, *, deriva
     return compiled(files)[0]
 
 
-def _for_derivatives(source: Path | Definition | Page | Law, where: CellKey, order: int) -> Path:
-    """Folder of the kernels of what derivatives of results are made of."""
+def _for_derivatives(
+    source: Path | Definition | Page | Law, where: CellKey, order: Variant
+) -> Path:
+    """Folder of the kernels of derivatives or of named values of results."""
     key, read = None, None
     if isinstance(source, Path):
         options = [*_texts(where), f"derivatives {order}"]
@@ -155,27 +163,29 @@ def _for_derivatives(source: Path | Definition | Page | Law, where: CellKey, ord
         key = None if read is None else key
     else:
         definitions = _definitions(source, where)
-    free = [d for d in definitions if not d.prescribed]
+    free = [d for d in definitions if isinstance(order, tuple) or not d.prescribed]
     if not free:
         names = ", ".join(d.name for d in definitions)
         raise ModelFileError(f"{names}: gives derivatives of its own, and results have none by it")
     return library([_differentiated(d, order) for d in free], key, read).folder
 
 
-def _differentiated(d: Definition, order: int) -> Definition:
-    """The model from which derivatives of an order are computed, itself for 0."""
+def _differentiated(d: Definition, order: Variant) -> Definition:
+    """The model from which derivatives of an order, or named values are computed; itself for 0."""
+    if isinstance(order, tuple):
+        return d.for_values(order)
     makers = (lambda: d, d.for_derivatives, d.for_second_derivatives)
     return makers[order]()
 
 
-def of_law(name: str, where: CellKey, *, derivatives: int = 0) -> Path:
+def of_law(name: str, where: CellKey, *, derivatives: Variant = 0) -> Path:
     """Folder of the kernels of a material that ships; raises ValueError for another name."""
     folder = _folder_of_law(name, where, derivatives=derivatives)
     _ORIGINS[folder] = Origin(name, where)
     return folder
 
 
-def _folder_of_law(name: str, where: CellKey, *, derivatives: int) -> Path:
+def _folder_of_law(name: str, where: CellKey, *, derivatives: Variant) -> Path:
     key = store.digest(["law", generator(), name, *_texts(where), str(derivatives)])
     files = store.recall(key)
     if files is not None:

@@ -7,10 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.definition.problem_definition import Block, StudyError
+from softehl.runtime.definition.problem_definition import (
+    Block,
+    ProblemDefinition,
+    StudyError,
+)
 from softehl.runtime.equations.system import System, contacts_with_history
+from softehl.runtime.equations.system_builder import build_system
 from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.results.result import Result
+from softehl.runtime.solve.solution import Point, Solution, Status
 
 SMALLEST = 1e-6
 """Of the whole load, or of the step in time that is asked for: a path ends where steps become
@@ -26,6 +32,16 @@ class InitialState:
     t: float
     x: Array
     histories: dict[str, Array]
+
+
+def at_rest(definition: ProblemDefinition) -> Result:
+    """Return the initial state of a study as a result, with the values prescribed at its start."""
+    system = build_system(definition)
+    problem = system.resting()
+    x = system.at_rest()
+    x[problem.fixed] = problem.values
+    solution = Solution(x, Status.CONVERGED, "", (), 0, 0)
+    return Result(system, problem, Point(0.0, solution), system.histories())
 
 
 def initial_state(system: System, start: Result | None) -> InitialState:

@@ -423,6 +423,7 @@ def add_block(
             block,
             differentiated=origin.differentiated(kernel),
             twice_differentiated=origin.differentiated(kernel, 2),
+            valued=origin.valued(kernel),
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -89,44 +89,48 @@ class KernelOrigin:
             return None  # it comes with what is needed
         return DerivativeKernel(self, kernel, order)
 
+    def valued(self, kernel: Kernel) -> ValueKernel | None:
+        """Return the maker of kernels of named values of a page; None without a page."""
+        no_page = isinstance(self.source, Kernel) or is_folder(self.source)
+        return None if no_page else ValueKernel(self, kernel)
+
 
 @dataclass(frozen=True, eq=False)
-class DerivativeKernel:
-    """Maker of the kernel of derivatives, of order 1 or 2, of the page of a kernel."""
+class _PageKernel:
+    """Maker of other kernels of the page of a kernel."""
 
     origin: KernelOrigin | None
     kernel: Kernel
-    order: int = 1
-
-    def __call__(self) -> Kernel:
-        """That kernel.  Raises StudyError where the page is another one meanwhile."""
-        return self._kernel
 
     def __getstate__(self) -> dict[str, Any]:
         """For `pickle`: a page that stands in no file stays behind."""
         origin = self.origin
-        if origin is None or not isinstance(origin.source, str | Path):
-            return {"origin": None, "kernel": self.kernel, "order": self.order}
-        in_file = str(origin.source).endswith(".py")
-        source = Path(origin.source).absolute() if in_file else origin.source
-        origin = replace(origin, source=source)
-        return {"origin": origin, "kernel": self.kernel, "order": self.order}
+        if origin is not None and isinstance(origin.source, str | Path):
+            in_file = str(origin.source).endswith(".py")
+            source = Path(origin.source).absolute() if in_file else origin.source
+            origin = replace(origin, source=source)
+        else:
+            origin = None
+        named = (f.name for f in fields(self))  # without what is cached
+        return {**{name: getattr(self, name) for name in named}, "origin": origin}
 
-    @cached_property
-    def _kernel(self) -> Kernel:
+    def _made(self, what: str, *, derivatives: int = 0, values: tuple[str, ...] = ()) -> Kernel:
+        """A kernel of the page.  Raises StudyError where the page is another one meanwhile."""
         if self.origin is None:
             raise StudyError(
-                f"derivatives of a study from a pickle need the page of {self.kernel.name}: add it "
+                f"{what} of a study from a pickle need the page of {self.kernel.name}: add it "
                 "from a model file"
             )
         if self._loaded(self.origin).signature != self.kernel.signature:
             raise StudyError(
                 f"the page of {self.kernel.name} is another one than the study was made with, and "
-                "derivatives would be those of another model: make the study again"
+                f"{what} would be those of another model: make the study again"
             )
-        return self._loaded(self.origin, derivatives=self.order)
+        return self._loaded(self.origin, derivatives, values)
 
-    def _loaded(self, origin: KernelOrigin, *, derivatives: int = 0) -> Kernel:
+    def _loaded(
+        self, origin: KernelOrigin, derivatives: int = 0, values: tuple[str, ...] = ()
+    ) -> Kernel:
         kernel = self.kernel
         return page_loader.load_page(
             origin.source,
@@ -136,7 +140,32 @@ class DerivativeKernel:
             materials=origin.law,
             derivatives=derivatives,
             varying=dict(origin.varying),
+            values=values,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class DerivativeKernel(_PageKernel):
+    """Maker of the kernel of derivatives, of order 1 or 2, of the page of a kernel."""
+
+    order: int = 1
+
+    def __call__(self) -> Kernel:
+        """That kernel.  Raises StudyError where the page is another one meanwhile."""
+        return self._kernel
+
+    @cached_property
+    def _kernel(self) -> Kernel:
+        return self._made("derivatives", derivatives=self.order)
+
+
+@dataclass(frozen=True, eq=False)
+class ValueKernel(_PageKernel):
+    """Maker of kernels whose fields are named values of the page."""
+
+    def __call__(self, names: tuple[str, ...]) -> Kernel:
+        """The kernel with these fields.  Raises StudyError, ModelError for another name."""
+        return self._made("values", values=names)
 
 
 def is_folder(source: object) -> bool:

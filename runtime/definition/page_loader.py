@@ -23,6 +23,7 @@ class PageLoader(Protocol):
         materials: bool = False,
         derivatives: int = 0,
         varying: Mapping[str, str] | None = None,
+        values: tuple[str, ...] = (),
     ) -> Kernel:
         """Return the kernel."""
         ...

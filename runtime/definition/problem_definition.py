@@ -62,7 +62,7 @@ class Block:
     data at the start, or None.
     arrays: curves and weights of networks by name.
     differentiated, twice_differentiated: make the kernels of first and of second derivatives, or
-    None where the page is C.
+    None where the page is C. valued: makes kernels whose fields are named values of the page.
     """
 
     name: str
@@ -80,6 +80,7 @@ class Block:
     arrays: Mapping[str, ArrayData] = field(default_factory=dict)
     differentiated: Callable[[], Kernel] | None = None
     twice_differentiated: Callable[[], Kernel] | None = None
+    valued: Callable[[tuple[str, ...]], Kernel] | None = None
 
     @property
     def shared(self) -> frozenset[str]:

@@ -31,6 +31,7 @@ from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError, place_text
 from softehl.runtime.mesh.plotting import picture_file, show_or_save
 from softehl.runtime.results.explanation import block_called, explain_element
+from softehl.runtime.results.integrals import integral
 from softehl.runtime.results.output import VtuFields, piece_names
 from softehl.runtime.results.plotting import picture_of
 from softehl.runtime.results.recovery import nodal_operator, recover_block
@@ -351,6 +352,43 @@ class Result:
         fields = self.problem.fields(block, self.point.solution.x)
         new = [f"new_{name}" for name in self.system.blocks[block].kernel.history]
         return {name: values for name, values in fields.items() if name not in new}
+
+    def integral(
+        self, expression: str, where: str | None = None, *, block: str | None = None
+    ) -> float:
+        """Return the integral of an expression over the reference body, a group or a side.
+
+        Parameters
+        ----------
+        expression : str
+            Arithmetic of names, "mu / 2 * (I1 - 3)": fields, unknowns, parameters and data of a
+            page, history after the step, values that the page names (`Model.define`), reference
+            coordinates x, y, z, the load factor or time t, on sides the normal n_x, n_y, n_z; with
+            sqrt, exp, log, sin, cos, tan, tanh, abs, sign, min and max. "energy" alone is what the
+            page minimises, "1" the volume.
+        where : str, optional
+            Group of cells, or a side; all cells if left out.
+        block : str, optional
+            Block of the names; may be left out if the names say it.
+
+        Returns
+        -------
+        float
+            The integral, in axisymmetry over whole rings.
+
+        Raises
+        ------
+        StudyError
+            A name is not there, or several blocks have it; the mesh is distributed.
+        MeshError
+            There is no such side or group.
+
+        Notes
+        -----
+        Names of pages are integrated by the quadrature of the page, coordinates and unknowns alone
+        by a rule for twice the order of the cells.
+        """
+        return integral(self, expression, where, block)
 
     def explain(self, element: int, block: str | None = None) -> Explanation:
         """Return every named value of a page in one element, as `Kernel.explain`.

@@ -384,6 +384,7 @@ def load_kernel(
     materials: bool = False,
     derivatives: int = 0,
     varying: "Mapping[str, str] | None" = None,
+    values: tuple[str, ...] = (),
 ) -> "Kernel":
     """Return a compiled kernel; derive and compile it if the cache does not have it.
 
@@ -408,6 +409,8 @@ def load_kernel(
     varying : mapping of str to str, optional
         Parameters of a page of fields or of a material that become "data" of elements or "point
         data"; other names are ignored.
+    values : tuple of str
+        Names that the page has given (`Model.define`): the only task is `fields`, with these.
 
     Returns
     -------
@@ -442,25 +445,27 @@ def load_kernel(
                     materials=True,
                     derivatives=derivatives,
                     varying=varying,
+                    values=values,
                 )
             with with_sympy():
                 from softehl.codegen.tools.kernel_cache import of_law
 
-                return kernel.kernel_in(of_law(source, where, derivatives=derivatives), None, cell)
+                folder = of_law(source, where, derivatives=values or derivatives)
+                return kernel.kernel_in(folder, None, cell)
         shipped = kernel.load_kernel(source)
-        if not derivatives:
+        if not (derivatives or values):
             return shipped
         with with_sympy():
             from softehl.codegen.models import ALL
 
-            return load_kernel(ALL[source](), derivatives=derivatives)
+            return load_kernel(ALL[source](), derivatives=derivatives, values=values)
     if isinstance(source, (str, Path)) and folder_given:
         return kernel.kernel_in(Path(source).resolve(), name, cell)
     from softehl.codegen.tools import kernel_cache
 
     place = Path(source) if isinstance(source, str) else source
     with with_sympy():
-        folder = kernel_cache.folder_of(place, where, derivatives=derivatives)
+        folder = kernel_cache.folder_of(place, where, derivatives=values or derivatives)
         loaded = kernel.kernel_in(folder, name, cell)
         if not loaded.functions:
             return loaded

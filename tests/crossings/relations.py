@@ -294,6 +294,10 @@ def energies(at: Problem) -> Pairs:
     energy = result.energy  # type: ignore[attr-defined]
     yield energy["balance"] + energy["external"], energy["external"]
     yield energy["internal"], energy["external"]
+    body = result.system.blocks["body"].kernel
+    alone = at.constraint != "spring" and at.load != "weight"
+    if "energy" in body.tasks and not body.history and alone:
+        yield result.integral("energy", block="body"), energy["internal"]
 
 
 def stable(at: Problem) -> Pairs:
