@@ -462,6 +462,24 @@ def impact(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(loc="center right")
 
 
+def adhesion(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2)
+    for (maugis, path), colour in zip(space["paths"].items(), (BLUE, ORANGE), strict=True):
+        force = space["force"]
+        way = [result.t for result in path]
+        left.plot(way, list(map(force, path)), color=colour, label=f"lambda = {maugis}")
+        found = max(path, key=force).fields("contact")
+        order = np.argsort(found["y"])
+        s = found["tension"].max()
+        right.plot(found["y"][order], found["tension"][order] / s, color=colour)
+    for value, name in ((2.0, "Bradley"), (1.5, "JKR")):
+        left.axhline(value, color=GREY, lw=0.8)
+        left.text(1.0, value + 0.03, name, ha="right", color=GREY, fontsize=7)
+    left.set(xlabel="pull / last pull", ylabel="force / (pi w R)", ylim=(0, 2.3))
+    left.legend(loc="upper right", bbox_to_anchor=(1.0, 0.65), fontsize=7)
+    right.set(xlabel="radius [mm]", ylabel="tension / strength", ylim=(-0.6, 1.1))
+
+
 def laminate(figure: Figure, space: dict[str, Any]) -> None:
     left, right = figure.subplots(1, 2, width_ratios=[1, 1.2])
     result = space["sheared"].result
@@ -565,6 +583,7 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "jumps": jumps,
     "laminate": laminate,
     "impact": impact,
+    "adhesion": adhesion,
 }
 
 if __name__ == "__main__":

@@ -57,7 +57,7 @@ LONG = {
     *(name for name in PARTS if "first-seal" in name),
     *(f"gallery/{entry}" for entry in ("contact", "cook", "enhanced", "fbar", "fit", "fracture")),
     *(f"gallery/{entry}" for entry in ("jumps", "stick-slip", "swing", "cahn-hilliard", "column")),
-    *("gallery/finite-plasticity", "gallery/maxwell"),
+    *("gallery/finite-plasticity", "gallery/maxwell", "gallery/adhesion", "gallery/impact"),
 }
 """Those that take 1.5 s and more."""
 

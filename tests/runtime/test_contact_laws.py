@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import softehl
 from softehl import Mesh, Result, Study, StudyError
@@ -185,7 +186,7 @@ def test_two_bars_are_pulled_apart() -> None:
 def worn(steps: int, **given: Any) -> Result:
     """A block under a dead load on a plate that is drawn away beneath it."""
     plate = Mesh.rectangle(3, 0.2, cells=(10, 1))
-    block = Mesh.rectangle(1, 0.5, cells=(3, 1)).map(lambda x: x + np.array([0.2, 0.2]))
+    block = Mesh.rectangle(1, 0.5, cells=(3, 1)).map(lambda x: x + np.array([0.2, 0.199]))
     study = Study(Mesh.union(block=block, plate=plate))
     study.add("body", linear, E=100)
     study.contact("block:bottom", "plate:top", law=archard, k=0.02, e=50, name="seat")
@@ -205,7 +206,7 @@ def test_archard_wears_by_pressure_times_way() -> None:
     # a step presses by the depth at its start
     np.testing.assert_allclose(found["worn"], depth, rtol=1e-8)
     bottom = result.values("u_y")[result.system.mesh.nodes("block:bottom")]
-    np.testing.assert_allclose(bottom, -0.5 / 50 - depth * 4 / 5, rtol=1e-8)
+    np.testing.assert_allclose(bottom, 0.001 - 0.5 / 50 - depth * 4 / 5, rtol=1e-8)
 
 
 def test_what_cannot_be_a_law_is_refused() -> None:
@@ -234,3 +235,30 @@ def test_a_march_with_inertia_takes_no_law() -> None:
     for method in ("explicit", "generalised-alpha"):
         with pytest.raises(StudyError, match=r"a contact by law=\.\.\. has no march with inertia"):
             next(iter(pulled().march(dt=0.1, until=1, method=method, mass={"body": {"rho": 1}})))
+
+
+@softehl.page
+def pressed_conductance(m: Any) -> None:
+    """A penalty, and a conductance that grows with its pressure."""
+    T = m.scalar("T")
+    e, h = m.parameters(e="stiffness [MPa/mm]", h="conductance by the pressure [W/mm^2/K/MPa]")
+    p = m.define("p", sp.Max(-e * m.gap, 0))
+    m.weak(-p, m.gap)
+    q = m.define("q", h * p * m.jump(T))
+    m.weak(q, m.jump(T))
+    m.fields(pressure=p, flux=q)
+
+
+def test_conductance_grows_with_the_pressure() -> None:
+    """Both as one law, of displacements and temperatures: 1 / q = 1 / q1 + 1 / (h p) + 1 / q2."""
+    study = Study(blocks(2, (1, 2)))
+    study.add("body", linear, E=10)
+    study.add("heat", heat, k=2, c=0.1)
+    given: dict[str, Any] = {"law": pressed_conductance, "e": 20, "h": 0.5}
+    study.contact("upper:bottom", "lower:top", name="seat", **given)
+    study.fix("lower:bottom", u_x=0, u_y=0, T=0)
+    study.fix("upper:top", u_x=0, u_y=-0.15, T=100)
+    found = study.solve().fields("seat")
+    p = 0.15 / (1.5 / 10 + 1 / 20)
+    np.testing.assert_allclose(found["pressure"], p, rtol=1e-9)
+    np.testing.assert_allclose(found["flux"], 100 / (1.5 / 2 + 1 / (0.5 * p)), rtol=1e-9)
