@@ -268,6 +268,8 @@ def test_rings_with_their_rubber() -> None:
         assert p.compound == rubber
         assert Seal(**p.model_dump()) == p
     assert made(ring="JIS B 2401 P20 1A", rod=20.0).compound == "NBR 70"
+    assert made(ring="U-cup 25x35x8 PU 95").compound == "PU 95"
+    assert made(ring="X-ring 36x4, FKM 75", rod=36.0, swelling=3.0).compound == "FKM 75"
     said = assumed(ring="MS28775-210", rod=19.0)
     assert "a rubber NBR 70, as MS28775 asks for" in said
     assert made(ring="MS28775-210", rod=19.0, mu=2.0, material="neo-hooke").shear_modulus == 2.0

@@ -140,6 +140,8 @@ def _in_piston(values: dict[str, Any]) -> None:
 
 def _with_ring(values: dict[str, Any]) -> None:
     ring_name = read_ring(values["ring"])
+    if ring_name.rubber:
+        _with_rubber_of_ring(values, ring_name.rubber)
     if ring_name.kind not in (None, "round"):
         section = values.setdefault("section", ring_name.kind)
         if section != ring_name.kind:
@@ -159,8 +161,6 @@ def _with_ring(values: dict[str, Any]) -> None:
         _with_cup(values, rod, ground, ring_name.width or 0.0)
         return
     ring = catalogue.ring(values["ring"])
-    if ring_name.rubber:
-        _with_rubber_of_ring(values, ring_name.rubber)
     if values.get("rod_diameter") is None:
         rod, bore = round(1.02 * ring.inner_diameter, 1), round(ring.outer_diameter, 1)
         raise ValueError(

@@ -124,7 +124,9 @@ def read_ring(name: str) -> RingName:
     text = plain(name)
     if match := _COMPOUND.fullmatch(text):
         rubber = read_rubber("ring", match["rubber"])
-        return replace(read_ring(match["ring"]), rubber=rubber.text if rubber else None)
+        return replace(
+            read_ring(match["ring"]), rubber=rubber.text if rubber else None, standard=None
+        )
     if match := _PARKER.fullmatch(text):
         return _with_standard(name, match["ring"], match["compound"], _PARKER_RUBBERS)
     if match := _MILITARY.fullmatch(text):
