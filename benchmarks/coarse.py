@@ -3,7 +3,7 @@
     python -m benchmarks.coarse [ORDER ...] [--unknowns N]
 
 Neo-Hooke on a distorted cube of hexahedra, one thread, the least of many: from the tangents of the
-elements, which are projected (before), and from the moduli at the points (after). Beside them the
+elements, which are projected, and from the moduli at the points. Beside them the
 largest memory that NumPy holds meanwhile, without what is kept for the products, and the greatest
 difference of both matrices, relative to the largest entry.
 """
@@ -54,7 +54,7 @@ def routes(order: int, unknowns: float) -> tuple[int, list[Callable[[], Setup]]]
     product = ElementProduct.of(block, x, parameters, levels.numberings[block.name])
     lower = levels.lower[block.name]
 
-    def before() -> Setup:
+    def projected_route() -> Setup:
         P, diagonal, at = levels.transfers[block.name].matrix(), np.zeros(system.size), 0
         projected = np.empty((len(lower), P.shape[1], P.shape[1]))
         for piece, _ in block.pieces(np.empty(0, dtype=np.int64)):
@@ -64,10 +64,10 @@ def routes(order: int, unknowns: float) -> tuple[int, list[Callable[[], Setup]]]
             at += len(tangents)
         return operator.assembled(lower, projected, len(levels.unknowns[1])), diagonal
 
-    def after() -> Setup:
+    def point_route() -> Setup:
         return operator.coarse_matrix(block, product, x, levels, free)
 
-    return system.size, [before, after]
+    return system.size, [projected_route, point_route]
 
 
 def measured(run: Callable[[], Setup]) -> tuple[float, float, Setup]:
@@ -90,11 +90,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("orders", nargs="*", type=int, default=[1, 2, 3, 4])
     parser.add_argument("--unknowns", type=float, default=27783)
     given = parser.parse_args(arguments)
-    print("order  unknowns  before ms  after ms  ratio  before MB  after MB  ratio  difference")
+    print("order  unknowns  projected  points ms  ratio  projected  points MB  ratio  difference")
     for order in given.orders:
-        size, (before, after) = routes(order, given.unknowns)
-        s, m, (K, d) = measured(before)
-        t, n, (A, e) = measured(after)
+        size, (first, second) = routes(order, given.unknowns)
+        s, m, (K, d) = measured(first)
+        t, n, (A, e) = measured(second)
         difference = max(abs(A - K).max() / abs(K).max(), np.abs(d - e).max() / np.abs(d).max())
         print(
             f"{order:5} {size:9} {1e3 * s:10.1f} {1e3 * t:9.1f} {s / t:6.1f} {m:10.1f} {n:9.1f} "
