@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 INNER = {"OutOfTimeError", "NotRealError", "DomainError", "StageError", "_CycleError"}
 """Caught where they are raised for."""
 WRAPPED = {
-    "a MeshError that names the file": {"AbaqusError", "GmshError"},
+    "a MeshError that names the file": {"AbaqusError", "GmshError", "UnvError"},
     "a pydantic.ValidationError that names the key": {"NotUnderstoodError", "OutlineError"},
     "another library, or engine": {"NoProductError", "NotTunedError"},
     "nothing: a fault of the compiler": {"IllegalGraphError"},

@@ -37,7 +37,7 @@ SHAPES = {
     "hex": ("hex8", "hex27", "hex64", "hex125", "hex216", "hex343"),
     "tri": ("tri3", "tri6"),
     "tet": ("tet4", "tet10"),
-    "wedge": ("wedge6",),
+    "wedge": ("wedge6", "wedge18"),
     "pyramid": ("pyramid5",),
 }
 """Elements with all nodes of an order, from order 1 on."""
@@ -49,8 +49,8 @@ def element(name: str, order: int | None = None) -> Element:
     Parameters
     ----------
     name : str
-        "hex20", or a shape: "line", "quad" and "hex" (orders 1 to 6), "tri" and "tet" (1 and 2),
-        "wedge" and "pyramid" (1).
+        "hex20", or a shape: "line", "quad" and "hex" (orders 1 to 6), "tri", "tet" and "wedge"
+        (1 and 2), "pyramid" (1).
     order : int, optional
         Order of the shape, element("hex", order=4).
 

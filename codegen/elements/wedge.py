@@ -1,4 +1,4 @@
-"""Wedges: wedge6 and wedge15 on triangle x [-1, 1]."""
+"""Wedges: wedge6, wedge15 and wedge18 on triangle x [-1, 1]."""
 
 from typing import Any
 
@@ -39,6 +39,16 @@ def _quadratic(xi: Any, eta: Any, zeta: Any) -> list[Any]:
     return [*corners, *edges, *(t * (1 - zeta**2) for t in L)]
 
 
+def _biquadratic(xi: Any, eta: Any, zeta: Any) -> list[Any]:
+    """Products of the functions of tri6 and line3: nodes inside the quadrilaterals, too."""
+    L, (lower, upper, middle) = barycentric((xi, eta)), lagrange_line(2, zeta)
+    corners = [t * (2 * t - 1) for t in L]
+    edges = [4 * L[a] * L[b] for a, b in ((0, 1), (1, 2), (2, 0))]
+    heights = ((corners, lower), (corners, upper), (edges, lower), (edges, upper))
+    heights += ((corners, middle), (edges, middle))
+    return [t * z for functions, z in heights for t in functions]
+
+
 _FLAT_LINEAR = powers(2, largest=1, total=1, squares=0)
 _FLAT_QUADRATIC = powers(2, largest=2, total=2, squares=1)
 ELEMENTS = (
@@ -68,6 +78,22 @@ ELEMENTS = (
             gmsh=18,
             abaqus="C3D15",
             gmsh_nodes=(*range(6), 6, 9, 7, 12, 14, 13, 8, 10, 11),
+            vtk_mirrored=True,
+        ),
+    ),
+    Element(
+        name="wedge18",
+        cell=CELL,
+        nodes=CELL.nodes(*CELL.edges, *CELL.sides[2:]),
+        shape=_biquadratic,
+        rule=wedge(4),
+        exponents=tuple((*a, b) for b in (0, 1, 2) for a in _FLAT_QUADRATIC),
+        face_kinds=("tri6", "quad9"),
+        files=FileNames(
+            "wedge18",
+            gmsh=13,
+            abaqus="C3D15V",
+            gmsh_nodes=(*range(6), 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16),
             vtk_mirrored=True,
         ),
     ),

@@ -31,7 +31,16 @@ if TYPE_CHECKING:
 
 Faces: TypeAlias = Mapping[str, Integers]
 """Kind of face -> node numbers (n, k), seen from outside counterclockwise."""
-Shape = Literal["quad", "serendipity", "triangle", "hex", "tetrahedron", "wedge", "pyramid"]
+Shape = Literal[
+    "quad",
+    "serendipity",
+    "triangle",
+    "hex",
+    "tetrahedron",
+    "wedge",
+    "lagrange_wedge",
+    "pyramid",
+]
 Predicate = Callable[[Array], Flags]
 """Of places (n, dim): which of them are meant, (n,)."""
 
@@ -236,11 +245,11 @@ class Mesh:
         cells : tuple of int
             Number of cells along x, y and z.
         order : int
-            Order of the cells, 1 to 6 of "hex", 1 and 2 of "tetrahedron" and "wedge", 1 of
-            "pyramid".
+            Order of the cells, 1 to 6 of "hex", 1 and 2 of "tetrahedron" and "wedge", 2 of
+            "serendipity" and "lagrange_wedge", 1 of "pyramid".
         shape : str
-            "hex" (hex8, hex27, up to hex343), "serendipity" (hex20), "tetrahedron" (tet4, tet10) or
-            "wedge" (wedge6, wedge15), "pyramid" (pyramid5).
+            "hex" (hex8, hex27, up to hex343), "serendipity" (hex20), "tetrahedron" (tet4, tet10),
+            "wedge" (wedge6, wedge15), "lagrange_wedge" (wedge18) or "pyramid" (pyramid5).
         spread : bool
             Under mpirun every process makes its own part only (docs/cluster.md); one process makes
             the whole.
@@ -321,7 +330,7 @@ class Mesh:
 
     @classmethod
     def read(cls, path: str | Path, *, spread: bool = False) -> Mesh:
-        """Read a mesh file of Gmsh, of Abaqus or CalculiX (.inp), or of a format of meshio.
+        """Read a file of Gmsh, of Abaqus or CalculiX (.inp), a universal file (.unv) or by meshio.
 
         Parameters
         ----------
@@ -354,7 +363,8 @@ class Mesh:
         Parameters
         ----------
         path : str or Path
-            The file; .msh, .inp, .vtu and .vtk keep the names of groups and sides.
+            The file; .msh, .inp, .unv, .vtu, .vtk and .med keep the names of groups and sides,
+            others warn.
         parts : int, optional
             Write so many files, part_1.npz, ... for "part.npz", each with cells that are close
             together, for `read(spread=True)`.

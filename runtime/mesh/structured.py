@@ -25,6 +25,7 @@ KINDS = {
     (3, "serendipity"): ("", "hex20"),
     (3, "tetrahedron"): ("tet4", "tet10"),
     (3, "wedge"): ("wedge6", "wedge15"),
+    (3, "lagrange_wedge"): ("", "wedge18"),
     (3, "pyramid"): ("pyramid5", ""),
 }
 """(dimension, shape) -> kinds of order 1, 2, ..."""
@@ -151,7 +152,7 @@ def _kind(dimension: int, order: int, shape: str) -> str:
     kinds = KINDS[dimension, shape]
     kind = kinds[order - 1] if order in range(1, len(kinds) + 1) else ""
     if not kind:
-        suffixes = {"serendipity": "2", "pyramid": "1"}
+        suffixes = {"serendipity": "2", "lagrange_wedge": "2", "pyramid": "1"}
         orders = suffixes.get(shape, "1 or 2" if len(kinds) == 2 else f"1 to {len(kinds)}")
         raise MeshError(f"order = {order}: {shape} cells have order {orders}")
     return kind

@@ -62,6 +62,7 @@ CELLS = {
     "tet10": Cell("tetrahedron", 2, (2, 1, 1)),
     "wedge6": Cell("wedge", 1, (2, 1, 1)),
     "wedge15": Cell("wedge", 2, (2, 1, 1)),
+    "wedge18": Cell("lagrange_wedge", 2, (2, 1, 1)),
     "pyramid5": Cell("pyramid", 1, (2, 1, 1)),
 }
 """Kinds of cells."""

@@ -386,7 +386,9 @@ def written(at: Problem) -> Pairs:
 _ALL = ("law", "cell", "load", "constraint", "geometry", "solver")
 _COARSE = {
     **{"quad4": 0.3, "tri3": 0.7, "hex8": 0.6, "tet4": 1.2, "wedge6": 0.8, "pyramid5": 0.6},
-    **dict.fromkeys(("quad8", "quad9", "tri6", "hex20", "hex27", "tet10", "wedge15"), 0.15),
+    **dict.fromkeys(
+        ("quad8", "quad9", "tri6", "hex20", "hex27", "tet10", "wedge15", "wedge18"), 0.15
+    ),
 }
 """What coarse meshes of orders 1 and 2 may be off by."""
 RELATIONS: dict[str, Relation] = {

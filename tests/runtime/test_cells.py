@@ -372,6 +372,7 @@ SHAPES: dict[str, dict[str, Any]] = {
     "tet10": {"shape": "tetrahedron", "order": 2},
     "wedge6": {"shape": "wedge"},
     "wedge15": {"shape": "wedge", "order": 2},
+    "wedge18": {"shape": "lagrange_wedge", "order": 2},
     "pyramid5": {"shape": "pyramid"},
     "hex8": {"shape": "hex"},
     "hex20": {"shape": "serendipity", "order": 2},
@@ -434,7 +435,9 @@ def straightened(mesh: Mesh, name: str) -> Mesh:
 
 
 EVERY = [
-    pytest.param(name, marks=[pytest.mark.slow] if name in ("hex20", "hex27", "wedge15") else [])
+    pytest.param(
+        name, marks=[pytest.mark.slow] if name in ("hex20", "hex27", "wedge15", "wedge18") else []
+    )
     for name in SHAPES
 ]
 
@@ -444,7 +447,7 @@ def test_order_of_convergence_of_every_element(name: str) -> None:
     """-div(grad u) = d pi^2 prod sin(pi x), k = 2: the error in L2 falls with order + 1."""
     errors = []
     sizes = (8, 16) if CELLS[name].dimension < 3 else (4, 8)
-    sizes = (3, 6) if name in ("hex27", "hex20", "tet10", "wedge15") else sizes
+    sizes = (3, 6) if name in ("hex27", "hex20", "tet10", "wedge15", "wedge18") else sizes
     for n in sizes:
         mesh = unit_mesh(name, n)
         study = Study(mesh)

@@ -222,16 +222,24 @@ def sorted_rows(rows: Any) -> list[list[int]]:
 
 SHAPES = [("quad", 1), ("quad", 2), ("triangle", 1), ("triangle", 2), ("hex", 1), ("hex", 2)]
 SHAPES += [("serendipity", 2), ("tetrahedron", 1), ("tetrahedron", 2), ("wedge", 1), ("wedge", 2)]
-SHAPES += [("pyramid", 1)]
+SHAPES += [("pyramid", 1), ("lagrange_wedge", 2)]
+LACKING = {"unv": {"quad9", "hex27", "wedge18"}, "med": {"quad9", "hex27", "wedge18"}}
+"""Kinds of cells that a format has not."""
 
 
 @pytest.mark.parametrize(("shape", "order"), SHAPES)
-@pytest.mark.parametrize("ending", ["inp", "msh", "vtu", "vtk"])
+@pytest.mark.parametrize("ending", ["inp", "msh", "unv", "vtu", "vtk", "med"])
 def test_a_mesh_that_is_written_reads_back_with_its_names(
     shape: str, order: int, ending: str, tmp_path: Path
 ) -> None:
+    if ending == "med":
+        pytest.importorskip("h5py")
     mesh = every_kind(shape, order)
     path = tmp_path / f"part.{ending}"
+    if set(mesh.cells) & LACKING.get(ending, set()):
+        with pytest.raises(MeshError, match=r"(quad9|hex27|wedge18) has no type|has no cells"):
+            mesh.write(path)
+        return
     mesh.write(path)
     again = Mesh.read(path)
     np.testing.assert_array_equal(again.points, mesh.points)
@@ -281,12 +289,110 @@ def test_sides_of_points_and_edges_stay_where_a_mesh_is_split_or_cut(tmp_path: P
         np.testing.assert_array_equal(rows, mesh.sides[name][kind])
 
 
-def test_a_format_without_names_says_so(tmp_path: Path) -> None:
+@pytest.mark.parametrize("ending", ["bdf", "mesh", "off", "ply", "stl", "vol"])
+def test_a_format_without_names_says_so(ending: str, tmp_path: Path) -> None:
     mesh = every_kind("triangle", 1)
     with pytest.warns(
-        UserWarning, match=r"part.stl: names are not written \(low half, left, right"
+        UserWarning, match=rf"part.{ending}: names are not written \(low half, left, right"
     ):
-        mesh.write(tmp_path / "part.stl")
+        mesh.write(tmp_path / f"part.{ending}")
+
+
+UNV = """    -1
+   164
+         1  SI: Metre (newton)         2
+    1.0D+0    1.0D+0    1.0D+0
+    2.7315D+2
+    -1
+    -1
+  2411
+         3         1         1        11
+   0.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00
+         5         1         1        11
+   2.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00
+         7         1         1        11
+   0.0000000000000000D+00   3.0000000000000000D+00   0.0000000000000000D+00
+         9         1         1        11
+   1.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00
+        10         1         1        11
+   1.0000000000000000D+00   1.5000000000000000D+00   0.0000000000000000D+00
+        11         1         1        11
+   0.0000000000000000D+00   1.5000000000000000D+00   0.0000000000000000D+00
+    -1
+    -1
+  2412
+        40        42         1         1         7         6
+         3         9         5        10         7        11
+        41        24         1         1         7         3
+         0         1         1
+         3         9         5
+    -1
+    -1
+  2467
+         1         0         0         0         0         0         0         1
+plate
+         8        40         0         0
+         2         0         0         0         0         0         0         3
+foot
+         8        41         0         0         7         7         0         0
+         7         5         0         0
+    -1
+"""
+"""A triangle of six nodes, its lower edge as a beam, with a group of each and of two nodes."""
+
+
+def test_a_universal_file_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "part.unv"
+    path.write_text(UNV)
+    mesh = Mesh.read(path)
+    mesh.check()
+    assert misplaced(mesh) == 0.0
+    assert volume(mesh, mesh.cells_of("plate")["tri6"], "tri6") == pytest.approx(3.0)
+    assert mesh.points[mesh.sides["foot"]["line3"][0]].tolist() == [[0, 0], [2, 0], [1, 0]]
+    assert mesh.points[mesh.sides["foot"]["point1"].ravel()].tolist() == [[2, 0], [0, 3]]
+
+
+OTHER = {
+    "dataset 780 is an older form of 2412, which is read": ("  2412\n", "   780\n"),
+    "element 40: type 43 has no cell here; there are 161 (point1), 21": (
+        "        42",
+        "        43",
+    ),
+    "element 40 has 6 nodes, type 41 (tri3) has 3": ("        42", "        41"),
+    "a line3 has node 8, which is not in the file": ("9         5\n    -1", "9         8\n    -1"),
+    "node 5 is given again": ("         3         1         1", "         5         1         1"),
+    "element 40 is given again": ("        41        24", "        40        24"),
+    "group 'plate' has element 44, which is not in": ("8        40", "8        44"),
+    "group 'foot' has node 4, which is not in": ("         7         7", "         7         4"),
+    "dataset 2467 ends in the middle": ("         7         5         0         0\n", ""),
+    "there are no nodes (dataset 2411) or no elements (2412)": ("  2412\n", "  2400\n"),
+    "nodes are in coordinate system 1: save them in the global one": (
+        "  2411\n",
+        "  2420\n         1\npart\n         1         1         8\nbore\n"
+        + "1 0 0\n0 1 0\n0 0 1\n0 0 0\n    -1\n    -1\n  2411\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("words", OTHER)
+def test_what_a_universal_file_lacks_is_named(words: str, tmp_path: Path) -> None:
+    path = tmp_path / "part.unv"
+    old, new = OTHER[words]
+    assert old in UNV
+    path.write_text(UNV.replace(old, new, 1))
+    with pytest.raises(MeshError, match=re.escape(words)) as info:
+        Mesh.read(path)
+    assert "\n" not in str(info.value)
+
+
+def test_older_groups_and_long_names_of_universal_files(tmp_path: Path) -> None:
+    path = tmp_path / "part.unv"
+    path.write_text(UNV.replace("  2467\n", "  2432\n"))
+    with pytest.warns(UserWarning, match="groups of dataset 2432 are left out; those of 2435"):
+        assert not Mesh.read(path).groups
+    mesh = Mesh.rectangle(1.0, 1.0, cells=(1, 1)).with_group("a" * 41, lambda x: x[:, 0] > 0)
+    with pytest.raises(MeshError, match=r"cannot be a name in a \.unv file: at most 40"):
+        mesh.write(path)
 
 
 def test_numbers_of_cells_become_names(tmp_path: Path) -> None:
@@ -319,10 +425,7 @@ def test_files_that_meshio_cannot_read_give_one_line(
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(MeshError, match=r"reads \.med with the package h5py: pip install h5py"):
         Mesh.read(path)
-    with (
-        pytest.raises(MeshError, match="the package h5py: pip install h5py"),
-        pytest.warns(UserWarning, match="names are not written"),
-    ):
+    with pytest.raises(MeshError, match="the package h5py: pip install h5py"):
         Mesh.rectangle(1.0, 1.0, cells=(1, 1)).write(path)
 
 

@@ -28,13 +28,14 @@ _GENERATORS = {
     **dict.fromkeys(("SYSTEM", "SYMMETRICMODELGENERATION", "IMPORT"), "a mesh"),
 }
 """Keywords that would make a mesh, and are not read."""
-_SOLIDS = {len(c.nodes): name for name, c in CELLS.items() if c.dimension == 3 and c.abaqus}
+_SOLIDS = {n: name for name, c in CELLS.items() if c.abaqus == (f"C3D{(n := len(c.nodes))}",)}
 _SOLID = rf"(?:D?C3D|DCC3D|AC3D|F3D|FC3D|EC3D|Q3D)({'|'.join(map(str, _SOLIDS))})(?!\d)"
 _SHELL = r"(?:M3D|SFM3D|R3D|DS|S|STRI)(3|4|6|8|9)(?!\d)"
 _PLANE = (
     r"(?:CPEG|CPE|CPS|CGAX|CAX|DC2D|DCAX|DCC2D|DCCAX|AC2D|ACAX|EC2D|Q2D|QAX)(3|4|6|8|9)(?![\d])"
 )
 _FAMILIES: tuple[tuple[str, str, dict[int, str]], ...] = (
+    ("solid", r"C3D(15)V", {15: "wedge18"}),
     ("solid", _SOLID, _SOLIDS),
     ("solid", r"(?:SC|CSS)(6|8)(?!\d)", {6: "wedge6", 8: "hex8"}),
     ("plane", _PLANE, {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}),
@@ -406,7 +407,7 @@ def _kind(keyword: _Keyword) -> tuple[str, str]:
             if not kinds:
                 return family, "line2" if family == "line" else "point1"
             return family, kinds[int(match[1])]
-    allowed = ", ".join(_TYPES[3][k] for k in _SOLIDS.values())
+    allowed = ", ".join(name for k, name in _TYPES[3].items() if CELLS[k].dimension == 3)
     raise AbaqusError(
         f"{keyword.location}: elements {name} have no cell here; there are {allowed}, CPS3/4/6/8 "
         "and CPE, CAX, S, M3D likewise, T3D2/3, B31/32 and their variants"

@@ -1,5 +1,5 @@
-"""Mesh files: groups of cells become named cells and sides, and back; others than Gmsh's (.msh) and
-those of Abaqus and CalculiX (.inp) by meshio.
+"""Mesh files: groups of cells become named cells and sides, and back; others than Gmsh's (.msh),
+those of Abaqus and CalculiX (.inp) and universal files (.unv) by meshio.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.io import write_text
 from softehl.runtime.mesh.cells import BY_FILE, CELLS, for_vtk, jacobians
 from softehl.runtime.mesh.mesh import Mesh, MeshError
-from softehl.runtime.mesh.readers import abaqus, gmsh
+from softehl.runtime.mesh.readers import abaqus, gmsh, unv
 from softehl.runtime.mesh.readers.file_content import Content
 from softehl.runtime.suggestions import join_names
 
@@ -25,6 +25,8 @@ _DEFECTS = (
     *(RuntimeError, AttributeError),
 )
 _VTK = (".vtu", ".vtk")
+_NAMED = (".msh", ".inp", ".unv", ".vtu", ".vtk", ".med")
+"""Formats whose files keep names."""
 _GROUP, _SIDE = "group:", "side:"
 """Beginnings of the names of cell data (of nodes: data of points) that are 1 in what has a name."""
 _PLAIN = "".join(chr(k) for k in range(32, 127) if chr(k) != "%")
@@ -57,6 +59,8 @@ def content_of(path: Path) -> Content:
         data = path.read_bytes() if path.suffix == ".msh" else b""
         if path.suffix.lower() == ".inp" or data.lstrip().startswith(b"*"):  # or of CalculiX's cgx
             return abaqus.read(path)
+        if path.suffix.lower() == ".unv":
+            return unv.read(path)
         return gmsh.parse(data) if b"$MeshFormat" in data else _by_meshio(path)
     except ModuleNotFoundError as error:
         raise MeshError(
@@ -231,6 +235,8 @@ def write(mesh: Mesh, path: Path) -> None:
             sides = {name: mesh.faces(name) for name in mesh.sides}
             text = abaqus.text(points, mesh.cells, mesh.groups, sides, mesh.dimension)
             write_text(path, text)
+        elif path.suffix.lower() == ".unv":
+            write_text(path, unv.text(points, *_named(mesh), mesh.dimension))
         else:
             _write_by_meshio(mesh, points, path)
     except ModuleNotFoundError as error:
@@ -239,27 +245,38 @@ def write(mesh: Mesh, path: Path) -> None:
             f"{error.name}"
         ) from None
     except _DEFECTS as error:
-        raise MeshError(f"cannot write {str(path)!r}: {' '.join(str(error).split())}") from None
+        reason = " ".join(str(error).split())
+        if isinstance(error, KeyError):  # meshio's tables of cells
+            reason = f"{path.suffix} has no cells {reason}"
+        raise MeshError(f"cannot write {str(path)!r}: {reason}") from None
 
 
 def _write_by_meshio(mesh: Mesh, points: Array, path: Path) -> None:
-    """Names as data of cells and points of VTK; a warning where a format has none."""
+    """Names as data of cells and points of VTK, as families of MED; a warning where a format has
+    none.
+    """
     meshio = import_meshio()
 
     cells = dict(mesh.cells)
     flags: dict[str, Any] = {}
     data: dict[str, Any] = {}
+    tags: dict[str, dict[int, list[str]]] = {}
     if path.suffix in _VTK:
         cells, flags, data = _flagged(mesh, "" if path.suffix == ".vtk" else _PLAIN)
+    elif path.suffix == ".med":
+        cells, flags, data, tags = _families(mesh)
     elif mesh.groups or mesh.sides:
         warn(
             f"{path.name}: names are not written ({join_names([*mesh.groups, *mesh.sides])}); "
-            ".msh, .inp, .vtu and .vtk keep them",
+            f"{join_names(_NAMED)} keep them",
             stacklevel=4,
         )
     blocks = [(CELLS[kind].meshio, nodes) for kind, nodes in cells.items()]
+    file_mesh = meshio.Mesh(points, blocks, data, flags)
+    for attribute, families in tags.items():
+        setattr(file_mesh, attribute, families)
     try:
-        meshio.write(path, meshio.Mesh(points, blocks, data, flags))
+        meshio.write(path, file_mesh)
     except meshio.WriteError as error:
         raise ValueError(str(error)) from None
 
@@ -284,6 +301,39 @@ def _flagged(mesh: Mesh, safe: str) -> tuple[dict[str, Integers], dict[str, Any]
         if set(members) - {"point1"}:
             flags[(_GROUP if name in mesh.groups else _SIDE) + title] = list(cell_flags.values())
     return {kind: for_vtk(kind, nodes) for kind, nodes in cells.items()}, flags, data
+
+
+def _families(
+    mesh: Mesh,
+) -> tuple[dict[str, Integers], dict[str, Any], dict[str, Any], dict[str, dict[int, list[str]]]]:
+    """For MED, the cells with the faces of sides, solids the other way round; the family of every
+    cell and point, and the names of every family: negative numbers for cells, positive for points.
+    """
+    cells, names = _named(mesh)
+    points = cells.pop("point1", np.empty((0, 1), np.int64)).ravel()
+    at_points: list[list[str]] = [[] for _ in mesh.points]
+    of_cells: dict[str, list[list[str]]] = {k: [[] for _ in v] for k, v in cells.items()}
+    for name, members in names.items():
+        for kind, numbers in members.items():
+            lists = at_points if kind == "point1" else of_cells[kind]
+            for k in points[numbers] if kind == "point1" else numbers:
+                lists[k].append(name)
+    families: dict[tuple[str, ...], int] = {(): 0}
+    numbers = {
+        kind: np.array([families.setdefault(tuple(n), -len(families)) for n in lists], np.int64)
+        for kind, lists in of_cells.items()
+    }
+    point_families: dict[tuple[str, ...], int] = {(): 0}
+    at = [point_families.setdefault(tuple(n), len(point_families)) for n in at_points]
+    tags = {
+        attribute: {number: list(some) for some, number in known.items() if some}
+        for attribute, known in (("cell_tags", families), ("point_tags", point_families))
+    }
+    turned = {
+        kind: nodes[:, list(CELLS[kind].mirrored)] if CELLS[kind].dimension == 3 else nodes
+        for kind, nodes in cells.items()
+    }
+    return turned, {"cell_tags": list(numbers.values())}, {"point_tags": np.array(at)}, tags
 
 
 def _named(mesh: Mesh) -> tuple[dict[str, Integers], dict[str, dict[str, Integers]]]:
