@@ -14,7 +14,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
 from softehl.codegen.tools.library import built_in, entries  # noqa: E402
-from tests.library.every import BENCHMARKS  # noqa: E402
+from tests.library.every import BENCHMARKS, CONVERGENCE  # noqa: E402
 
 PAGE, NUMBERS = HERE / "library.md", HERE / "library.json"
 INTRODUCTION = """# The library of elements and laws
@@ -51,11 +51,16 @@ def main(names: list[str]) -> None:
     """Compute the numbers of some entries, all if none is named, and write the page."""
     numbers = json.loads(NUMBERS.read_text(encoding="utf-8")) if NUMBERS.exists() else {}
     for b in BENCHMARKS:
-        if not names or b.entry in names or b.problem not in numbers:
-            numbers[b.problem] = float(f"{b.run():.8g}")
-            print(f"{b.entry}: {b.problem}: {numbers[b.problem]:.6g} ({b.published:.6g})")
-    known = {b.problem for b in BENCHMARKS}
-    numbers = {problem: v for problem, v in sorted(numbers.items()) if problem in known}
+        if not names or b.entry in names or b.key not in numbers:
+            numbers[b.key] = float(f"{b.run():.8g}")
+            print(f"{b.key}: {numbers[b.key]:.6g} ({b.published:.6g})")
+    for c in CONVERGENCE:
+        for size in c.sizes:
+            if not names or c.entry in names or c.key(size) not in numbers:
+                numbers[c.key(size)] = float(f"{c.run(size):.8g}")
+                print(f"{c.key(size)}: {numbers[c.key(size)]:.6g} ({c.published:.6g})")
+    known = {b.key for b in BENCHMARKS} | {c.key(n) for c in CONVERGENCE for n in c.sizes}
+    numbers = {key: v for key, v in sorted(numbers.items()) if key in known}
     NUMBERS.write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(INTRODUCTION + "\n".join(_sections(numbers)), encoding="utf-8")
 
@@ -78,11 +83,24 @@ def _sections(numbers: dict[str, float]) -> list[str]:
     lines += ["## Published numbers", "", "| entry | problem | published | ours | error | source |"]
     lines += ["|---|---|---|---|---|---|"]
     for b in BENCHMARKS:
-        value = numbers[b.problem]
+        value = numbers[b.key]
         lines.append(
             f"| `{b.entry}` | {b.problem} | {b.published:.6g} | {value:.6g} | "
             f"{b.error(value):.1e} | {b.source} |"
         )
+    sizes = CONVERGENCE[0].sizes
+    lines += [
+        "",
+        "## Convergence of shells",
+        "",
+        "Deflections by those published; cells a side:",
+        "",
+    ]
+    lines += [f"| problem | entry | published | {' | '.join(map(str, sizes))} | source |"]
+    lines += ["|---|---|---|" + "---|" * len(sizes) + "---|"]
+    for c in CONVERGENCE:
+        shares = " | ".join(f"{numbers[c.key(size)] / c.published:.4f}" for size in c.sizes)
+        lines.append(f"| {c.problem} | `{c.entry}` | {c.published:.5g} | {shares} | {c.source} |")
     return [*lines, ""]
 
 

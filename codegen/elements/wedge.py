@@ -44,8 +44,8 @@ def _biquadratic(xi: Any, eta: Any, zeta: Any) -> list[Any]:
     L, (lower, upper, middle) = barycentric((xi, eta)), lagrange_line(2, zeta)
     corners = [t * (2 * t - 1) for t in L]
     edges = [4 * L[a] * L[b] for a, b in ((0, 1), (1, 2), (2, 0))]
-    heights = ((corners, lower), (corners, upper), (edges, lower), (edges, upper))
-    heights += ((corners, middle), (edges, middle))
+    heights = [(corners, lower), (corners, upper), (edges, lower), (edges, upper)]
+    heights += [(corners, middle), (edges, middle)]
     return [t * z for functions, z in heights for t in functions]
 
 

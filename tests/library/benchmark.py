@@ -23,6 +23,32 @@ class Benchmark:
     run: Callable[[], float]
     slow: bool = False
 
+    @property
+    def key(self) -> str:
+        """Name of the number."""
+        return f"{self.entry}: {self.problem}"
+
     def error(self, value: float) -> float:
         """Relative error of a value."""
         return abs(value - self.published) / (abs(self.published) or 1.0)
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """A number of an element on finer and finer meshes.
+
+    published: the limit, from `source`. tolerance: relative, of the finest mesh. run: computes the
+    number with so many cells a side. sizes: numbers of cells.
+    """
+
+    entry: str
+    problem: str
+    published: float
+    tolerance: float
+    source: str
+    run: Callable[[int], float]
+    sizes: tuple[int, ...] = (4, 8, 16, 32)
+
+    def key(self, size: int) -> str:
+        """Name of one of the numbers."""
+        return f"{self.entry}: {self.problem}: {size} x {size}"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from softehl import Mesh, Study
+from softehl import Mesh, Result, Study
+from softehl.runtime.arrays import Array
 from tests.library.benchmark import Benchmark
 
 BENCHMARKS: list[Benchmark] = []
@@ -69,6 +70,99 @@ BENCHMARKS.append(
 )
 
 
+SOIL: dict[str, float] = {"E": 1.0, "mobility": 1.0}
+
+
+def _modulus(nu: float) -> float:
+    """Stiffness of the soil without lateral strain."""
+    return SOIL["E"] * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+
+
+def slab(nu: float, share: float) -> float:
+    """Pressure times width by force in the middle of Mandel's slab, at c t / a^2 = share."""
+    study = Study(Mesh.rectangle(1.0, 0.1, cells=(20, 1), order=2))
+    study.add("soil", element="biot", nu=nu, **SOIL)
+    study.fix("bottom", u_y=0)
+    study.fix("left", u_x=0)
+    study.fix("right", p=0)
+    study.tie(lambda x: np.isclose(x[:, 1], 0.1) & (x[:, 0] > 0), (0.0, 0.1), "u_y")
+    study.load("top", u_y=lambda x, t: -1e-3 * np.ones(len(x)))
+    until = share / _modulus(nu)
+    *_, last = study.march(dt=until / 200, until=until, method="euler")
+    return float(last.at((0.0, 0.0))["p"] / 1e-3)
+
+
+def _slab(nu: float, share: float) -> float:
+    """Series of Mandel for an incompressible fluid."""
+    eta = (1 - nu) / (0.5 - nu)
+    balance = lambda a: np.sin(a) - eta * a * np.cos(a)  # noqa: E731
+    a = np.array(
+        [brentq(balance, k * np.pi + 1e-3 * (k == 0), (k + 0.5) * np.pi) for k in range(100)]
+    )
+    weights = np.sin(a) / (a - np.sin(a) * np.cos(a)) * (1 - np.cos(a))
+    return float(np.sum(weights * np.exp(-(a**2) * share)))
+
+
+def ball(share: float, nu: float = 0.25, n: int = 16) -> float:
+    """Pressure by load in the centre of Cryer's sphere, at c t / R^2 = share, by half a section."""
+
+    def quarter(s: Array) -> Array:
+        return np.asarray(s * np.sqrt(1 - s[:, ::-1] ** 2 / 2))
+
+    mesh = Mesh.rectangle(1.0, 1.0, cells=(n, n), order=2).map(quarter)
+    study = Study(mesh, geometry="axisymmetric")
+    study.add("soil", element="biot", nu=nu, **SOIL)
+    study.fix("left", u_x=0)
+    study.fix("bottom", u_y=0)
+    for side in ("right", "top"):
+        study.fix(side, p=0)
+        study.load(side, u_x=lambda x, t: -1e-3 * x[:, 0], u_y=lambda x, t: -1e-3 * x[:, 1])
+    until = share / _modulus(nu)
+    *_, last = study.march(dt=until / 200, until=until, method="euler")
+    return float(last.at((0.0, 0.0))["p"] / 1e-3)
+
+
+def _ball(share: float, nu: float = 0.25) -> float:
+    """Series of Cryer for an incompressible fluid, as in Verruijt."""
+    eta = (1 - nu) / (1 - 2 * nu)
+    balance = lambda a: (1 - eta * a**2 / 2) * np.sin(a) - a * np.cos(a)  # noqa: E731
+    grid = np.linspace(1e-2, 100 * np.pi, 4000)
+    signs = np.signbit(balance(grid))
+    left = np.flatnonzero(signs[1:] != signs[:-1])
+    a = np.array([brentq(balance, grid[k], grid[k + 1]) for k in left])
+    weights = (np.sin(a) - a) / ((eta - 1) * np.sin(a) + eta * a * np.cos(a) / 2)
+    return float(eta * np.sum(weights * np.exp(-(a**2) * share)))
+
+
+BENCHMARKS += [
+    *(
+        Benchmark(
+            "biot",
+            f"Mandel's slab, nu = {nu}, 20 cells of order 2, 200 steps: p a / F in the middle, "
+            f"T = {share}",
+            _slab(nu, share),
+            2e-3,
+            "Mandel (1953), Geotechnique 3, series",
+            partial(slab, nu, share),
+        )
+        for nu, share in ((0.25, 0.05), (0.0, 0.1), (0.0, 0.5))
+    ),
+    *(
+        Benchmark(
+            "biot",
+            f"Cryer's sphere, nu = 0.25, 16 x 16 cells of order 2, 200 steps: p / P in the "
+            f"centre, T = {share}",
+            _ball(share),
+            5e-3,
+            "Cryer (1963), Q. J. Mechanics and Applied Mathematics 16, series",
+            partial(ball, share),
+            slow=True,
+        )
+        for share in (0.05, 0.1)
+    ),
+]
+
+
 CRACK: dict[str, Any] = {"E": 1000.0, "nu": 0.0, "Gc": 1.0, "length": 0.5}
 
 
@@ -80,14 +174,19 @@ def strength(element: str) -> float:
     study.fix("bottom", u_y=0)
     E, Gc, length = (CRACK[k] for k in ("E", "Gc", "length"))
     at2 = 9 / 16 * np.sqrt(E * Gc / (3 * length))
-    closed = {"at2": at2, "at1": np.sqrt(3 * E * Gc / (8 * length))}[element]
+    closed = at2 if element == "at2" else np.sqrt(3 * E * Gc / (8 * length))
     study.fix("right", u_x=2 * closed / E)
     stresses: list[float] = []
     study.solve(steps=200, on_step=lambda r: stresses.append(r.reaction("right")["u_x"]))
     return float(max(stresses) / closed)
 
 
-for entry, formula in (("at2", "9 / 16 sqrt(E Gc / (3 l))"), ("at1", "sqrt(3 E Gc / (8 l))")):
+for entry, formula in (
+    ("at2", "9 / 16 sqrt(E Gc / (3 l))"),
+    ("at1", "sqrt(3 E Gc / (8 l))"),
+    ("at1_amor", "sqrt(3 E Gc / (8 l)), volume and deviator"),
+    ("at1_spectral", "sqrt(3 E Gc / (8 l)), principal strains"),
+):
     BENCHMARKS.append(
         Benchmark(
             entry,
@@ -113,11 +212,14 @@ def closed_crack(element: str) -> float:
 for entry, stiffness, formula in (
     ("at2_amor", 1000.0 / 1.5, "K"),
     ("at2_spectral", 1200.0, "lambda + 2 G"),
+    ("at1_amor", 1000.0 / 1.5, "K"),
+    ("at1_spectral", 1200.0, "lambda + 2 G"),
 ):
+    order = entry[:3].upper()
     BENCHMARKS.append(
         Benchmark(
             entry,
-            f"broken point in uniaxial compression: stress [MPa], 0.01 ({formula})",
+            f"broken point of {order} in uniaxial compression: stress [MPa], 0.01 ({formula})",
             -0.01 * stiffness,
             1e-6,
             "closed form",
@@ -171,6 +273,55 @@ BENCHMARKS.append(
         slow=True,
     )
 )
+
+
+@cache
+def driven_cavity(reynolds: float, n: int = 24) -> Result:
+    """Cavity with a moving lid, by cells that are smaller at the walls."""
+
+    def graded(x: Array) -> Array:
+        return np.asarray(x - 0.7 * np.sin(2 * np.pi * x) / (2 * np.pi))
+
+    study = Study(Mesh.rectangle(1.0, 1.0, cells=(n, n), order=2).map(graded))
+    study.add("fluid", element="navier_stokes", rho=reynolds, eta=1.0)
+    for side in ("left", "right", "bottom"):
+        study.fix(side, v_x=0, v_y=0)
+    inside = lambda x: (x[:, 1] == 1.0) & (x[:, 0] > 0.0) & (x[:, 0] < 1.0)  # noqa: E731
+    study.fix(inside, v_x=1.0, v_y=0)
+    study.fix((0.0, 0.0), p=0)
+    return study.solve(steps=4)
+
+
+def in_cavity(reynolds: float, place: tuple[float, float], component: str) -> float:
+    """A velocity of the cavity."""
+    return float(driven_cavity(reynolds).at(place)[component])
+
+
+GHIA = "Ghia, Ghia and Shin (1982)"
+BOTELLA = "Botella and Peyret (1998), Computers & Fluids 27, 421-433"
+for reynolds, component, place, published, tolerance, source in (
+    (400, "v_x", (0.5, 0.2813), -0.32726, 1e-2, GHIA),
+    (400, "v_y", (0.2266, 0.5), 0.30203, 1e-2, GHIA),
+    (400, "v_y", (0.8594, 0.5), -0.44993, 1.5e-2, GHIA),
+    (1000, "v_x", (0.5, 0.1719), -0.38289, 2e-2, GHIA),
+    (1000, "v_y", (0.1563, 0.5), 0.37095, 2e-2, GHIA),
+    (1000, "v_y", (0.9063, 0.5), -0.51550, 3e-2, GHIA),
+    (1000, "v_x", (0.5, 0.1717), -0.3885698, 2e-3, BOTELLA),
+    (1000, "v_y", (0.1578, 0.5), 0.3769447, 2e-3, BOTELLA),
+    (1000, "v_y", (0.9092, 0.5), -0.5270771, 4e-3, BOTELLA),
+):
+    BENCHMARKS.append(
+        Benchmark(
+            "navier_stokes",
+            f"cavity with a moving lid, Re = {reynolds}, 24 x 24 cells of order 2: {component} at "
+            f"({place[0]:g}, {place[1]:g})",
+            published,
+            tolerance,
+            source,
+            partial(in_cavity, reynolds, place, component),
+            slow=True,
+        )
+    )
 
 
 def duct() -> float:

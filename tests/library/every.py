@@ -8,3 +8,4 @@ BENCHMARKS = [
     *laws.BENCHMARKS,
     *coupled.BENCHMARKS,
 ]
+CONVERGENCE = structures.CONVERGENCE

@@ -35,6 +35,22 @@ def tube(element: str, cells: tuple[int, int], order: int, **parameters: Any) ->
     return float(1 + study.solve(steps=10).at((INNER, 0.0))["u_x"] / INNER)
 
 
+def thick_tube(n: int = 8) -> float:
+    """As `tube`, by enhanced hexahedra in one layer of n x n."""
+    study = Study(
+        Mesh.box((1.0, 1.0, 0.2), cells=(n, n, 1)).map(
+            lambda x: np.column_stack([ring(x), x[:, 2]])
+        )
+    )
+    study.add("tube", element="q1e9", mu=1.0, kappa=1e5)
+    study.fix("front", u_y=0)
+    study.fix("back", u_x=0)
+    study.fix("bottom", u_z=0)
+    study.fix("top", u_z=0)
+    study.pressure("left", _tube())
+    return float(1 + study.solve(steps=10).at((INNER, 0.0, 0.0))["u_x"] / INNER)
+
+
 def _tube() -> float:
     """Inner pressure over mu at the stretch."""
     outer = np.sqrt(OUTER**2 + (STRETCH**2 - 1) * INNER**2) / OUTER
@@ -44,6 +60,7 @@ def _tube() -> float:
 for entry, cells, order, tolerance, parameters in (
     ("q1p0", (16, 16), 1, 2e-3, {"kappa": 1e5}),
     ("fbar", (16, 16), 1, 2e-3, {"kappa": 1e5}),
+    ("q1e9", (16, 16), 1, 2e-3, {"kappa": 1e5}),
     ("taylor_hood", (8, 8), 2, 1e-4, {}),
 ):
     BENCHMARKS.append(
@@ -57,6 +74,20 @@ for entry, cells, order, tolerance, parameters in (
             partial(tube, entry, cells, order, **parameters),
         )
     )
+
+
+BENCHMARKS.append(
+    Benchmark(
+        "q1e9",
+        f"incompressible tube, radii 1 and 2, inner pressure {_tube():.5g} mu, 8 x 8 x 1 cells: "
+        "inner stretch",
+        STRETCH,
+        3e-3,
+        "closed form",
+        thick_tube,
+        slow=True,
+    )
+)
 
 
 def cook(n: int) -> float:
@@ -215,10 +246,10 @@ BENCHMARKS.append(
 )
 
 
-def bending_in_space() -> float:
+def bending_in_space(element: str) -> float:
     """Deflection of a bar of one layer of cells by a moment."""
     study = Study(Mesh.box((10.0, 1.0, 1.0), cells=(5, 1, 1)))
-    study.add("bar", element="pian_tong", E=1000.0, nu=0.3)
+    study.add("bar", element=element, E=1000.0, nu=0.3)
     study.fix("left", u_x=0)
     study.fix((0.0, 0.0, 0.0), u_y=0, u_z=0)
     study.fix((0.0, 0.0, 1.0), u_y=0)
@@ -252,7 +283,15 @@ BENCHMARKS += [
         100.0 / (2 * 1000.0),
         1e-9,
         "closed form",
-        bending_in_space,
+        partial(bending_in_space, "pian_tong"),
+    ),
+    Benchmark(
+        "q1e4",
+        "pure bending in space of 5 x 1 x 1 cells, nu = 0.3: deflection M l^2 / (2 E I)",
+        100.0 / (2 * 1000.0),
+        1e-9,
+        "closed form",
+        partial(bending_in_space, "q1e4"),
     ),
     Benchmark(
         "pian_tong",

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
-from softehl import Mesh, Study
+from softehl import Mesh, Result, Study
 from softehl.runtime.arrays import Array, Flags
-from tests.library.benchmark import Benchmark
+from tests.library.benchmark import Benchmark, Convergence
 
 BENCHMARKS: list[Benchmark] = []
 
@@ -282,25 +283,38 @@ def cylinder(n: int = 32) -> float:
     return float(-study.solve().at((0.0, 0.0, radius))["u_z"] / scale)
 
 
-def hemisphere(n: int = 16) -> float:
-    """Deflection under the loads of a hemisphere with a hole of 18 degrees, a quarter."""
-    radius, scale = 10.0, 1e-3
+SPHERE = 10.0
+"""Radius of the hemisphere."""
+
+
+def pinched_hemisphere(n: int, force: float) -> Study:
+    """A quarter of a hemisphere with a hole of 18 degrees: outward forces along x, inward along y.
+
+    force: of a whole hemisphere, half of which acts on the quarter.
+    """
 
     def place(s: Array) -> Array:
         a, b = np.pi / 2 * s[:, 0], np.radians(72) * s[:, 1]
-        return radius * np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)], axis=1)
+        return SPHERE * np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)], axis=1)
 
     mesh = surface(n, place)
-    normal = mesh.points / radius
+    normal = mesh.points / SPHERE
     study = shell(mesh, normal, E=6.825e7, nu=0.3, t=0.04)
     for axis in (0, 1):
         where = lambda x, axis=axis: np.isclose(x[:, axis], 0, atol=1e-9)  # noqa: E731
         study.fix(where, **{f"u_{'xyz'[axis]}": 0})
         _symmetric(study, normal, where, axis)
-    study.fix((radius, 0.0, 0.0), u_z=0)
-    study.load((radius, 0.0, 0.0), u_x=scale)
-    study.load((0.0, radius, 0.0), u_y=-scale)
-    return float(study.solve().at((radius, 0.0, 0.0))["u_x"] / scale)
+    study.fix((SPHERE, 0.0, 0.0), u_z=0)
+    study.load((SPHERE, 0.0, 0.0), u_x=force / 2)
+    study.load((0.0, SPHERE, 0.0), u_y=-force / 2)
+    return study
+
+
+def hemisphere(n: int = 16) -> float:
+    """Deflection under the loads of a hemisphere with a hole of 18 degrees, a quarter."""
+    scale = 1e-3
+    result = pinched_hemisphere(n, 2 * scale).solve()
+    return float(result.at((SPHERE, 0.0, 0.0))["u_x"] / scale)
 
 
 BENCHMARKS += [
@@ -323,6 +337,93 @@ BENCHMARKS += [
         slow=True,
     ),
 ]
+
+
+@cache
+def hemisphere_path(n: int = 32) -> Array:
+    """Parts of a force of 400, and the displacements of the loads: inwards, outwards."""
+    rows: list[list[float]] = []
+
+    def record(result: Result) -> None:
+        inwards = -result.at((0.0, SPHERE, 0.0))["u_y"]
+        rows.append([result.t, inwards, result.at((SPHERE, 0.0, 0.0))["u_x"]])
+
+    pinched_hemisphere(n, 400.0).solve(steps=20, on_step=record)
+    return np.array(rows)
+
+
+@cache
+def slit_plate_path(radial: int = 10, around: int = 80) -> Array:
+    """Parts of the line force of 0.8, and the deflections of the inner and the outer corner.
+
+    A ring of radii 6 and 10 is slit along the x axis, clamped on one side of it and lifted on the
+    other.
+    """
+    flat = Mesh.rectangle(1.0, 1.0, cells=(around, radial))
+    a, r = 2 * np.pi * flat.points[:, 0], 6 + 4 * flat.points[:, 1]
+    points = np.stack([r * np.cos(a), r * np.sin(a), 0 * a], axis=1)
+    mesh = Mesh(points, flat.cells, sides=flat.sides)
+    study = shell(mesh, np.tile([0.0, 0.0, 1.0], (len(points), 1)), E=21e6, nu=0.0, t=0.03)
+    study.fix("left", u_x=0, u_y=0, u_z=0, theta_1=0, theta_2=0)
+    study.load("right", u_z=0.8)
+    end = flat.nodes("right")
+    corners = end[np.argsort(r[end])[[0, -1]]]
+    rows: list[list[float]] = []
+    study.solve(steps=40, on_step=lambda s: rows.append([s.t, *s.values("u_z")[corners]]))
+    return np.array(rows)
+
+
+def on_path(path: Callable[[], Array], column: int, share: float) -> float:
+    """A displacement at a part of the load, between the steps by a spline."""
+    rows = path()
+    return float(CubicSpline(rows[:, 0], rows[:, column])(share))
+
+
+LARGE_ROTATIONS: list[tuple[str, Callable[[], Array], int, str, dict[float, float]]] = [
+    (
+        "hemisphere with a hole of 18 degrees, 32 x 32 cells a quarter, F = {:.3g}",
+        hemisphere_path,
+        1,
+        "inward displacement",
+        {0.25: 3.833, 0.5: 5.902, 1.0: 8.178},
+    ),
+    (
+        "hemisphere with a hole of 18 degrees, 32 x 32 cells a quarter, F = {:.3g}",
+        hemisphere_path,
+        2,
+        "outward displacement",
+        {0.25: 2.596, 0.5: 3.406, 1.0: 4.067},
+    ),
+    (
+        "slit ring of radii 6 and 10, 10 x 80 cells, line force {:.3g}",
+        slit_plate_path,
+        1,
+        "deflection at radius 6",
+        {0.2: 6.725, 0.5: 10.468, 1.0: 13.891},
+    ),
+    (
+        "slit ring of radii 6 and 10, 10 x 80 cells, line force {:.3g}",
+        slit_plate_path,
+        2,
+        "deflection at radius 10",
+        {0.2: 9.160, 0.5: 13.768, 1.0: 17.528},
+    ),
+]
+"""Problem, path, its column, what it is, and part of the load -> displacement as published."""
+for problem, path, column, what, values in LARGE_ROTATIONS:
+    largest = 400.0 if path is hemisphere_path else 0.8
+    for share, value in values.items():
+        BENCHMARKS.append(
+            Benchmark(
+                "shell_mitc4",
+                f"{problem.format(share * largest)}: {what}",
+                value,
+                1.5e-2,
+                "Sze, Liu and Lo (2004)",
+                partial(on_path, path, column, share),
+                slow=True,
+            )
+        )
 
 
 def sphere(n: int = 8) -> float:
@@ -548,3 +649,47 @@ BENCHMARKS.append(
         elastica,
     )
 )
+
+
+def solid_hemisphere(n: int = 16) -> float:
+    """Deflection under the loads of a hemisphere with a hole, a quarter, by solid shells."""
+    scale, t = 1e-3, 0.04
+
+    def place(s: Array) -> Array:
+        a, b = np.pi / 2 * s[:, 0], np.radians(72) * s[:, 1]
+        r = SPHERE + (s[:, 2:] - 0.5) * t
+        return r * np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)], axis=1)
+
+    study = Study(Mesh.box((1.0, 1.0, 1.0), cells=(n, n, 1)).map(place))
+    study.add("shell", element="solid_shell", E=6.825e7, nu=0.3, q_x=0.0, q_y=0.0, q_z=0.0)
+    for axis, c in ((0, "x"), (1, "y")):
+        where = lambda x, axis=axis: np.isclose(x[:, axis], 0, atol=1e-9)  # noqa: E731
+        study.fix(where, **{f"u_{c}": 0})
+    study.fix((SPHERE - t / 2, 0.0, 0.0), u_z=0)
+    places = [(r, 0.0, 0.0) for r in (SPHERE - t / 2, SPHERE + t / 2)]
+    for x in places:
+        study.load(x, u_x=scale / 2)
+        study.load((0.0, x[0], 0.0), u_y=-scale / 2)
+    result = study.solve()
+    return float(np.mean([result.at(x)["u_x"] for x in places]) / scale)
+
+
+CONVERGENCE = [
+    Convergence(entry, problem, published, tolerance, "MacNeal and Harder (1985)", run)
+    for problem, published, tolerance, runs in (
+        ("roof of Scordelis and Lo, a quarter", 0.3024, 1.5e-2, (roof, solid_roof)),
+        (
+            "pinched cylinder with diaphragms, an eighth",
+            1.8248e-5,
+            2e-2,
+            (cylinder, solid_cylinder),
+        ),
+        (
+            "hemisphere with a hole of 18 degrees, a quarter",
+            0.0940,
+            2e-2,
+            (hemisphere, solid_hemisphere),
+        ),
+    )
+    for entry, run in zip(("shell_mitc4", "solid_shell"), runs, strict=True)
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -18,11 +19,13 @@ from softehl.codegen.tools.library import (
     text_of,
 )
 from softehl.runtime.mesh.cells import CELLS
-from tests.library.benchmark import Benchmark
-from tests.library.every import BENCHMARKS
+from tests.library.benchmark import Benchmark, Convergence
+from tests.library.every import BENCHMARKS, CONVERGENCE
 from tests.library.laws import TENSION
 
-PAGE = (Path(__file__).parents[2] / "docs" / "library.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "library.md").read_text(encoding="utf-8")
+NUMBERS = json.loads((DOCS / "library.json").read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize(
@@ -35,6 +38,15 @@ PAGE = (Path(__file__).parents[2] / "docs" / "library.md").read_text(encoding="u
 def test_published_numbers(benchmark: Benchmark) -> None:
     value = benchmark.run()
     assert benchmark.error(value) <= benchmark.tolerance, (value, benchmark.published)
+
+
+@pytest.mark.parametrize("table", CONVERGENCE, ids=lambda c: f"{c.entry}: {c.problem}")
+def test_shells_converge(table: Convergence) -> None:
+    """The numbers of the page: the coarsest anew, the finest within the tolerance."""
+    found = [NUMBERS[table.key(size)] for size in table.sizes]
+    assert table.run(table.sizes[0]) == pytest.approx(found[0], rel=1e-5)
+    assert abs(found[-1] / table.published - 1) <= table.tolerance
+    assert abs(found[-1] / table.published - 1) < abs(found[0] / table.published - 1)
 
 
 def test_every_entry_is_short_documented_and_has_a_number() -> None:

@@ -319,7 +319,7 @@ def _families(
             for k in points[numbers] if kind == "point1" else numbers:
                 lists[k].append(name)
     families: dict[tuple[str, ...], int] = {(): 0}
-    numbers = {
+    of_kinds = {
         kind: np.array([families.setdefault(tuple(n), -len(families)) for n in lists], np.int64)
         for kind, lists in of_cells.items()
     }
@@ -333,7 +333,7 @@ def _families(
         kind: nodes[:, list(CELLS[kind].mirrored)] if CELLS[kind].dimension == 3 else nodes
         for kind, nodes in cells.items()
     }
-    return turned, {"cell_tags": list(numbers.values())}, {"point_tags": np.array(at)}, tags
+    return turned, {"cell_tags": list(of_kinds.values())}, {"point_tags": np.array(at)}, tags
 
 
 def _named(mesh: Mesh) -> tuple[dict[str, Integers], dict[str, dict[str, Integers]]]:
