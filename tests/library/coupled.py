@@ -70,12 +70,12 @@ BENCHMARKS.append(
 )
 
 
-SOIL: dict[str, float] = {"E": 1.0, "mobility": 1.0}
+SOIL: dict[str, Any] = {"E": 1.0, "mobility": 1.0}
 
 
 def _modulus(nu: float) -> float:
     """Stiffness of the soil without lateral strain."""
-    return SOIL["E"] * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    return float(SOIL["E"] * (1 - nu) / ((1 + nu) * (1 - 2 * nu)))
 
 
 def slab(nu: float, share: float) -> float:
@@ -125,7 +125,10 @@ def ball(share: float, nu: float = 0.25, n: int = 16) -> float:
 def _ball(share: float, nu: float = 0.25) -> float:
     """Series of Cryer for an incompressible fluid, as in Verruijt."""
     eta = (1 - nu) / (1 - 2 * nu)
-    balance = lambda a: (1 - eta * a**2 / 2) * np.sin(a) - a * np.cos(a)  # noqa: E731
+
+    def balance(a: Any) -> Any:
+        return (1 - eta * a**2 / 2) * np.sin(a) - a * np.cos(a)
+
     grid = np.linspace(1e-2, 100 * np.pi, 4000)
     signs = np.signbit(balance(grid))
     left = np.flatnonzero(signs[1:] != signs[:-1])

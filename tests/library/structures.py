@@ -658,7 +658,8 @@ def solid_hemisphere(n: int = 16) -> float:
     def place(s: Array) -> Array:
         a, b = np.pi / 2 * s[:, 0], np.radians(72) * s[:, 1]
         r = SPHERE + (s[:, 2:] - 0.5) * t
-        return r * np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)], axis=1)
+        place = np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)], axis=1)
+        return np.asarray(r * place)
 
     study = Study(Mesh.box((1.0, 1.0, 1.0), cells=(n, n, 1)).map(place))
     study.add("shell", element="solid_shell", E=6.825e7, nu=0.3, q_x=0.0, q_y=0.0, q_z=0.0)
