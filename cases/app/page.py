@@ -27,6 +27,7 @@ from softehl.cases.harness.report.part import FinishedRun
 from softehl.cases.harness.resume import advice_of
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.trade.normalise_text import NotUnderstoodError, number_text
+from softehl.cases.seal.gland.trade.oil_names import FAMILIES
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.rubber_names import RANGES
 from softehl.cases.seal.report import style
@@ -64,6 +65,7 @@ _RINGS = (
     *("X-ring 36x4", "X-ring AS568-210", "X-ring AS568-226"),
     *("U-cup 20x30x8", "U-cup 25x35x8", "U-cup 36x46x8", "U-cup 50x65x12"),
     *(ring.name for ring in catalogue.as568().values() if _SMALL < ring.inner_diameter < _LARGE),
+    *(ring.name for code, ring in catalogue.series().items() if code[0] == "P"),
 )
 _HARDNESSES = {"FKM": (75, 80, 90), "EPDM": (70, 80), "PU": (90, 95)}
 _RUBBERS = tuple(f"{p} {s}" for p in RANGES for s in _HARDNESSES.get(p, (70, 80, 90)))
@@ -71,6 +73,7 @@ _OILS = (
     *(f"HLP {grade}" for grade in (10, 15, 22, 32, 46, 68, 100)),
     *(f"HVLP {grade}" for grade in (15, 22, 32, 46, 68)),
     *(f"ISO VG {grade}" for grade in (10, 15, 22, 32, 46, 68, 100, 150, 220)),
+    *(f"{family} {grade}" for family in FAMILIES for grade in (32, 46, 68)),
     *("46 cSt at 40 degC, 6.8 cSt at 100 degC", "10 mPas", "100 mPas"),
 )
 
