@@ -8,7 +8,7 @@ the changes of the points about it, by its part of their area.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -20,7 +20,7 @@ from softehl.runtime.contact.mortar_overlap import CORNER, common_part
 from softehl.runtime.contact.mortar_pair import FaceGeometry, PairPoint, Varied
 from softehl.runtime.contact.search import Contact, ContactSide, FaceContact, by_kind
 from softehl.runtime.discretisation.element_blocks import ElementBlock
-from softehl.runtime.kernels.kernel import Kernel
+from softehl.runtime.kernels.kernel import Kernel, KernelError
 from softehl.runtime.mesh.cells import CELLS, Cell, measures
 
 AXES = "xyz"
@@ -37,7 +37,8 @@ class PairLawKernel:
     Unknowns: displacements of the nodes of both sides, node by node, unless the sides do not move;
     then each field at the nodes of the first and of the second side, `counts` of them. data:
     displacements of the step before; depth, reach; history at the corners of the first side; in 3-D
-    corners of the triangle, 3 times CORNER. values: of the parameters.
+    corners of the triangle, 3 times CORNER. values: of the parameters. differentiated: makes the
+    kernel of derivatives of the law, or None where its page is C.
     """
 
     law: Kernel
@@ -48,6 +49,7 @@ class PairLawKernel:
     order: int
     counts: Mapping[str, tuple[int, int]]
     values: Mapping[str, Any]
+    differentiated: Callable[[], Kernel] | None = None
 
     @property
     def name(self) -> str:
@@ -109,6 +111,25 @@ class PairLawKernel:
                 )
                 K[np.ix_(rows, columns)] += change
         return R, K
+
+    def rate(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+        """Rate of the residuals (n, ndof) as the parameters move by direction, (n, k).
+
+        Raises KernelError where the law has no derivatives.
+        """
+        if self.differentiated is None:
+            raise KernelError(
+                f"{self.law.name} comes as C without derivatives: give its page instead"
+            )
+        R, law = np.zeros(dofs.shape), self.differentiated()
+        for point in self._points(coordinates, dofs, given["data"], columns=0):
+            rows, z, _ = self._inputs(point, dofs, given["data"])
+            arrays = np.empty((len(rows), 0)), z, np.ascontiguousarray(direction[rows])
+            f = law.pseudo_load(*arrays, parameters=given["parameters"])
+            for row, sign, columns, (S, _) in self._tests(point):
+                share = sign * point.weight[0][rows] * f[:, row]
+                R[np.ix_(rows, columns)] += share[:, None] * S[rows]
+        return R
 
     def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """None, (n, 0, 0): see `evaluated`."""

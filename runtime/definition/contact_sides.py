@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,10 +34,14 @@ _PAIRS = {2: ("line2_pair", "plane strain"), 3: ("quad4_pair", "solid")}
 
 @dataclass(frozen=True, eq=False)
 class LawRequest:
-    """Law of a contact: its kernel on pairs, and the values of its parameters."""
+    """Law of a contact: its kernel on pairs, and the values of its parameters.
+
+    differentiated: makes the kernel of its derivatives, or None where its page is C.
+    """
 
     kernel: Kernel
     parameters: Mapping[str, Number]
+    differentiated: Callable[[], Kernel] | None = None
 
     @property
     def conservative(self) -> bool:
@@ -123,7 +127,8 @@ def _law(
 ) -> LawRequest:
     """The kernel of a law on pairs, and its parameters.  Raises StudyError."""
     cell, geometry = _PAIRS[definition.mesh.dimension]
-    kernel = KernelOrigin(*source, geometry, law=False).loaded(cell)
+    origin = KernelOrigin(*source, geometry, law=False)
+    kernel = origin.loaded(cell)
     if kernel.cell != cell:
         raise StudyError(
             f"{context}: {kernel.name} is no law of contact: give a page of m.gap, "
@@ -143,7 +148,7 @@ def _law(
     if missing:
         raise StudyError(f"{context}: give {join_names(missing)}, parameters of {kernel.name}")
     values = {k: v if callable(v) else finite(f"{context}: {k}", v) for k, v in parameters.items()}
-    return LawRequest(kernel, values)
+    return LawRequest(kernel, values, origin.differentiated(kernel))
 
 
 def _contact_and_sides(

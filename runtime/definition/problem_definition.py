@@ -158,8 +158,9 @@ class ProblemDefinition:
 
     @property
     def size(self) -> int:
-        """Number of blocks, supports, loads and initial values; it only grows."""
-        counted = (self.blocks, self.conditions, self.forces, self.start, self.point_values)
+        """Number of blocks, contacts, supports, loads and initial values; it only grows."""
+        counted = (self.blocks, self.contacts, self.conditions, self.forces, self.start)
+        counted = (*counted, self.point_values)
         return sum(map(len, counted))
 
     def prescribed(self, name: str) -> Integers:

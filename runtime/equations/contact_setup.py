@@ -146,6 +146,7 @@ def _law_contact(
                 order=order,
                 counts=counts,  # type: ignore[arg-type]
                 values=request.law.parameters,
+                differentiated=request.law.differentiated,
             )
     history = sum(u.endswith("_before") for u in law.unknowns)
     return LawContact(

@@ -19,7 +19,14 @@ from softehl.runtime.kernels.kernel_call import ArgumentError
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity.hessian import Term, hessian_products
 from softehl.runtime.sensitivity.input_parsing import By
-from softehl.runtime.sensitivity.inputs import Input, Key, PageArray, PageDatum, PageParameter
+from softehl.runtime.sensitivity.inputs import (
+    Input,
+    Key,
+    LawParameter,
+    PageArray,
+    PageDatum,
+    PageParameter,
+)
 from softehl.runtime.sensitivity.jacobian import Entry, by_key, jacobian
 from softehl.runtime.sensitivity.quantities import PointValue, Quantity, ReactionSum
 from softehl.runtime.solve.solution import NotConverged
@@ -115,7 +122,8 @@ class SearchVariables:
         if (start < lower).any() or (start > upper).any() or (lower >= upper).any():
             raise StudyError("bounds: give (least, largest) with the value in the study between")
         stiff = [
-            np.full(len(item.value), isinstance(item, PageParameter | PageDatum)) for item in inputs
+            np.full(len(item.value), isinstance(item, LawParameter | PageParameter | PageDatum))
+            for item in inputs
         ]
         positive = np.concatenate(stiff) & (start > 0.0) & ((lower >= 0.0) | (lower == -np.inf))
         sizes = np.where(start == 0.0, 1.0, np.abs(start))

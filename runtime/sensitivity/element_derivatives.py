@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array
+from softehl.runtime.contact.pair_law import PairLawKernel
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Spring, Tie
@@ -31,7 +32,7 @@ class ElementDerivatives:
     """The elements of a block in a converged step.
 
     width: of rows, the arguments that may move: coordinates, data and parameters of a page,
-    coordinates and amount of a load.
+    coordinates and amount of a load, coordinates and parameters of a law of contact.
     """
 
     def __init__(self, tape: Tape, name: str) -> None:
@@ -42,7 +43,9 @@ class ElementDerivatives:
         self.coordinates = np.shape(self.block.coordinates)[1]
         self.n = len(self.dofs)
         self._dimension = tape.system.mesh.dimension
-        if self.page is None:
+        if isinstance(self.block.kernel, PairLawKernel):
+            self.width = self.coordinates + len(self.block.kernel.parameters)
+        elif self.page is None:
             self.width = self.coordinates + 1
         else:
             kernel = self.page.kernel
@@ -59,6 +62,11 @@ class ElementDerivatives:
 
         history: (n, points, k) rates of the point data. arrays: rates of run-time arrays by name.
         """
+        law = self.block.kernel
+        if isinstance(law, PairLawKernel):
+            given = {"data": self.block.data, "parameters": self.parameters}
+            direction = rows[:, self.coordinates :]
+            return law.rate(self.block.coordinates, self.dofs, direction, **given)
         if self.page is None:
             return self._load(rows)
         kernel = self._kernel("pseudo_load")

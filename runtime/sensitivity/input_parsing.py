@@ -18,6 +18,7 @@ from softehl.runtime.definition.problem_definition import (
 from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.sensitivity.inputs import (
     Input,
+    LawParameter,
     LoadAmount,
     NodeCoordinates,
     PageArray,
@@ -89,6 +90,11 @@ def _input(definition: ProblemDefinition, owner: str, name: str, mode: Any) -> I
     blocks = _blocks(definition, owner)
     if blocks:
         return _of_page(owner, name, blocks)
+    laws = {c.name: c for c in definition.contacts if c.law is not None}
+    if owner in laws:
+        parameters = [*laws[owner].law.parameters]
+        _require_matches(owner, name, [n for n in parameters if n == name], parameters)
+        return LawParameter((owner, name), laws[owner])
     head, _, side = str(owner).partition(":")
     if head == "nodes":
         return _of_nodes(definition, owner, name, side, mode)
@@ -96,7 +102,7 @@ def _input(definition: ProblemDefinition, owner: str, name: str, mode: Any) -> I
         return _support(definition, owner, name, side)
     if any(_key_of(f) == owner for f in definition.forces):
         return _amounts(definition, owner, name)
-    owners = [*definition.blocks, *dict.fromkeys(_key_of(f) for f in definition.forces)]
+    owners = [*definition.blocks, *laws, *dict.fromkeys(_key_of(f) for f in definition.forces)]
     owners += dict.fromkeys(f"fix:{_plain(c.where)}" for c in definition.conditions)
     owners.append("nodes")
     raise StudyError(

@@ -13,6 +13,8 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.contact.pair_law import PairLawKernel
+from softehl.runtime.definition.contact_sides import ContactRequest
 from softehl.runtime.definition.problem_definition import (
     Block,
     Load,
@@ -198,6 +200,51 @@ class PageParameter:
             parameters = {**definition.blocks[block.name].parameters, self.key[1]: changed_value}
             changed = replace(definition.blocks[block.name], parameters=parameters)
             definition.blocks[block.name] = changed
+
+    def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
+        """See `Input`."""
+        return []
+
+
+@dataclass(frozen=True, eq=False)
+class LawParameter:
+    """A parameter of a law of contact; request: that contact."""
+
+    key: Key
+    request: ContactRequest
+    scalar: bool = True
+
+    @property
+    def value(self) -> Array:
+        """See `Input`."""
+        return np.array([_number(self._given)])
+
+    @property
+    def _given(self) -> Any:
+        assert self.request.law is not None
+        return self.request.law.parameters[self.key[1]]
+
+    def seeds(self, tape: Tape) -> InputSeeds:
+        """See `Input`."""
+        rate = float(self._given(tape.step.t)) if callable(self._given) else 1.0
+        columns = []
+        for block in tape.problem.assembler.blocks:
+            if isinstance(block.kernel, PairLawKernel) and block.name.startswith(
+                f"{self.request.name}: "
+            ):
+                n, width = block.coordinates.shape
+                column = width + block.kernel.parameters.index(self.key[1])
+                columns.append(InputColumn(block.name, column, _one(n), np.full(n, rate)))
+        return InputSeeds(columns)
+
+    def put(self, definition: ProblemDefinition, value: Array) -> None:
+        """See `Input`."""
+        for k, contact in enumerate(definition.contacts):
+            if contact.name == self.request.name:
+                changed = _changed(self._given, float(value[0]))
+                parameters = {**contact.law.parameters, self.key[1]: changed}
+                law = replace(contact.law, parameters=parameters)
+                definition.contacts[k] = replace(contact, law=law)
 
     def prescribed_curvatures(self, tape: Tape, others: Sequence[Move]) -> list[PrescribedSeeds]:
         """See `Input`."""

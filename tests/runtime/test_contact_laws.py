@@ -138,6 +138,34 @@ def test_conductance_on_the_way() -> None:
     assert slope["upper", "k"] == pytest.approx(expected, rel=1e-9)
 
 
+def test_a_parameter_of_a_law_is_an_input() -> None:
+    """dq/dh = q^2 / (100 h^2), adjoint and direct; a fit finds it."""
+    study, expected = conducting(), -100 / RESISTANCE**2 / 0.7**2
+    result = study.solve()
+    slope = result.sensitivity("T", reaction="lower:bottom", by={"seat": ["h"]})
+    assert slope["seat", "h"] == pytest.approx(expected, rel=1e-12)
+    ahead, other = (study.varied({("seat", "h"): h}).solve() for h in (0.7 + 1e-5, 0.3))
+    rates = result.derivative(by={"seat": ["h"]}).reshape(len(result.x))
+    np.testing.assert_allclose(rates, (ahead.x - result.x) / 1e-5, atol=1e-3)
+    measured = {"lower:bottom": {"T": other.reaction("lower:bottom")["T"]}}
+    assert study.fit(measured, by={"seat": ["h"]}).values["seat", "h"] == pytest.approx(0.3)
+    with pytest.raises(StudyError, match="'seat' has no 'k'; it has h"):
+        result.sensitivity("T", reaction="lower:bottom", by={"seat": ["k"]})
+
+
+def test_a_law_is_part_of_the_size_of_a_study() -> None:
+    """A result knows that a contact came after it."""
+    study = Study(blocks(2, (1, 1)))
+    study.add("body", heat, k=1, c=1)
+    study.fix("upper:top", T=1)
+    study.fix("lower:bottom", T=0)
+    before = study.solve()
+    study.contact("upper:bottom", "lower:top", law=conductance, h=1e9)
+    assert study.solve().reaction("upper:top")["T"] == pytest.approx(1 / 1.5, rel=1e-6)
+    with pytest.raises(StudyError, match="the study was changed after this result"):
+        before.sensitivity("T", reaction="upper:top", by={"body": ["k"]})
+
+
 def test_conductance_of_a_deformed_contact() -> None:
     """Pressed blocks: mechanics by the built-in contact, heat by a law, on their deformed sides."""
     study = Study(blocks(2, (1, 1)))
