@@ -29,6 +29,7 @@ from softehl.runtime.analyses.homogenisation import Cell
 from softehl.runtime.analyses.initial_state import at_rest
 from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.analyses.time_integrators import MethodName, TimeIntegrator
+from softehl.runtime.analyses.two_scales import add_unit_cells
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition import loads_and_supports
 from softehl.runtime.definition.contact_sides import add_contact
@@ -143,6 +144,7 @@ class Study:
         *,
         material: Source = None,
         element: str | None = None,
+        cell: Cell | None = None,
         on: On | Sequence[Sequence[int]] = None,
         cells: str | None = None,
         model: str | None = None,
@@ -169,6 +171,9 @@ class Study:
         element : str, optional
             Instead of `source`: an element of the library, such as "truss"; `softehl elements`
             lists them.
+        cell : Cell, optional
+            Instead of `source`: a periodic unit cell at every integration point, with
+            `processes=2` in two processes. See docs/study.md.
         on : str, callable or array (n, k), optional
             A side; a page of one node has an element at each of its nodes. "interior" are the
             facets between cells. An array gives the elements themselves by their node numbers.
@@ -210,13 +215,28 @@ class Study:
             The page is wrong.
         """
         geometry = geometry_of(self.mesh, self.geometry)
+        form = form_of(name, shared, called, along, rule, constant)
+        if cell is not None:
+            if [source, material, element, model] != [None] * 4:
+                raise StudyError(f"{name!r}: cell=...: leave page, material, element and model out")
+            add_unit_cells(
+                self._definition,
+                name,
+                cell,
+                form,
+                geometry=geometry,
+                on=elements_on(name, on),
+                cells=cells,
+                options=given,
+            )
+            return
         add_block(
             self._definition,
             name,
             KernelOrigin.of(
                 name, source, material=material, element=element, model=model, geometry=geometry
             ),
-            form_of(name, shared, called, along, rule, constant),
+            form,
             on=elements_on(name, on),
             cells=cells,
             arguments=given,

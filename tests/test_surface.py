@@ -28,12 +28,13 @@ SECTIONS = ("Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes")
 """Sections of numpydoc, in their order."""
 INNER = {
     "protocols, which public classes and users' objects satisfy": {
-        *("Engine", "Kinematics", "NonlinearProblem"),
+        *("Engine", "Kinematics", "LinearSolver", "NonlinearProblem", "PointState"),
     },
     "records of a run, which a case of one's own makes": {"Cells", "State", "StepReport"},
     "records between a public class and its own methods": {
         *(
             "Affine",
+            "Basis",
             "Call",
             "CellOptions",
             "Constraints",

@@ -14,7 +14,8 @@ from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, hstack
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csc_array, csr_array, hstack
 from scipy.sparse.csgraph import connected_components
 
 from softehl.runtime.analyses.initial_state import SMALLEST
@@ -28,12 +29,16 @@ from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.linear.direct import direct_solver
+from softehl.runtime.solve.linear.linear_solver import LinearSolver, solved_columns
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
 from softehl.runtime.suggestions import join_names
 
 Gradient: TypeAlias = "Array | Sequence[Sequence[float | None]]"
 """Mean deformation gradient, (dim, dim); None where the mean stress is zero instead."""
+
+Small: TypeAlias = "NDArray[np.int32]"
+"""Indices of a sparse pattern."""
 
 _AXES = "xyz"
 _NET = 1e-6  # of the sum of the terms: a larger net force is more than Newton's method leaves
@@ -65,21 +70,14 @@ class Homogenised:
     def P(self) -> Array:
         """Mean first Piola-Kirchhoff stress (dim, dim) [MPa]."""
         r = self.result.problem.assembler.residual(self.result.x, self.result.problem.parameters)
-        return (self.cell.modes.T @ r).reshape(self.F.shape) / self.cell.volume
+        return self.cell.stress(r)
 
     @cached_property
     def A(self) -> Array:
         """Exact tangent dP_iJ / dF_kL, (dim, dim, dim, dim) [MPa]."""
-        problem, modes = self.result.problem, self.cell.modes
+        problem = self.result.problem
         K = problem.assembler.linearise(self.result.x, problem.parameters)[1]
-        T = self.cell.fluctuations
-        stiff = K @ modes
-        tangent = modes.T @ stiff
-        if T.shape[1]:  # else nothing fluctuates: one linear cell
-            factors = direct_solver("auto").factorise(csc_array(T.T @ K @ T))
-            bent = np.stack([factors.solve(row) for row in np.asarray(T.T @ stiff).T], axis=1)
-            tangent = tangent - modes.T @ (K @ (T @ bent))
-        return np.asarray(tangent).reshape(2 * self.F.shape) / self.cell.volume
+        return self.cell.condensed(K, direct_solver("auto"))[0].reshape(2 * self.F.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +104,72 @@ class Cell:
     def __repr__(self) -> str:
         """Summary in one line."""
         return f"<Cell: volume {self.volume:.6g}, {self.system.mesh!r}>"
+
+    @cached_property
+    def basis(self) -> Basis:
+        """Fluctuations as the basis of the free unknowns."""
+        return Basis(self.fluctuations)
+
+    def displacement(self, F: Array) -> Array:
+        """Return the unknowns of a mean deformation gradient without fluctuations.
+
+        Parameters
+        ----------
+        F : array (dim, dim)
+            Mean deformation gradient.
+
+        Returns
+        -------
+        array (n,)
+            Unknowns.
+        """
+        return np.asarray(self.modes @ (F - np.eye(len(F))).ravel())
+
+    def stress(self, r: Array) -> Array:
+        """Return the mean stress by the residuals of the cell.
+
+        Parameters
+        ----------
+        r : array (n,)
+            Residuals of all unknowns.
+
+        Returns
+        -------
+        array (dim, dim)
+            Mean first Piola-Kirchhoff stress [MPa].
+        """
+        dim = self.system.mesh.dimension
+        return np.asarray(self.modes.T @ r).reshape(dim, dim) / self.volume
+
+    def condensed(self, K: csc_array[np.float64], solver: LinearSolver) -> tuple[Array, Array]:
+        """Return the tangent of the mean stress, with fluctuations condensed, and their slope.
+
+        Parameters
+        ----------
+        K : sparse array (n, n)
+            Tangent of the cell.
+        solver : LinearSolver
+            Solver of the condensation.
+
+        Returns
+        -------
+        A : array (dim dim, dim dim)
+            dP/dF, row by row [MPa].
+        slope : array (m, dim dim)
+            Derivatives of the free unknowns by F at equilibrium.
+
+        Raises
+        ------
+        SingularMatrix
+            The fluctuations are not determined.
+        """
+        stiff = np.asarray(K @ self.modes)
+        A, slope = self.modes.T @ stiff, np.zeros((self.basis.size, self.modes.shape[1]))
+        if self.basis.size:  # else nothing fluctuates: one linear cell
+            factors = solver.factorise(self.basis.matrix(K))
+            slope = -solved_columns(factors, np.asarray(self.basis.rows @ stiff))
+            A = A + np.asarray(self.basis.rows @ (K.T @ self.modes)).T @ slope
+        return np.asarray(A) / self.volume, slope
 
     def solve(
         self,
@@ -191,17 +255,13 @@ class _CellPath:
     z: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        basis, w = self.cell.fluctuations, self.x - self._displacement(self.initial)
-        counts: Array = np.asarray(basis.sum(axis=0)).ravel()
+        w = self.x - self.cell.displacement(self.initial)
         opened = (self.initial - self._unit)[self.free]
-        self.z = np.concatenate([np.asarray(basis.T @ w) / counts, opened])
+        self.z = np.concatenate([self.cell.basis.coordinates(w), opened])
 
     @property
     def _unit(self) -> Array:
         return np.eye(len(self.initial))
-
-    def _displacement(self, F: Array) -> Array:
-        return np.asarray(self.cell.modes @ (F - self._unit).ravel())
 
     def problem_at(self, t: float) -> PeriodicProblem:
         """The equations at a share of the way."""
@@ -209,9 +269,11 @@ class _CellPath:
         F[self.free] = self._unit[self.free]
         system, cell = self.cell.system, self.cell
         problem = system.problem(system.quasi_static_step(t, self.x, self.histories))
-        opened = csc_array(cell.modes[:, self.free.ravel()])
-        basis = csc_array(hstack([cell.fluctuations, opened]))
-        return PeriodicProblem(problem, basis, self._displacement(F), F)
+        basis = cell.basis
+        if self.free.any():
+            opened = csc_array(cell.modes[:, self.free.ravel()])
+            basis = Basis(csc_array(hstack([cell.fluctuations, opened])))
+        return PeriodicProblem(problem, basis, cell.displacement(F), F)
 
     def commit(self, point: Point) -> None:
         """Go on from a converged point."""
@@ -241,32 +303,134 @@ class _CellPath:
 
 
 @dataclass(frozen=True, eq=False)
+class Basis:
+    """Basis B (n, m) of the free unknowns z of a cell, and its products."""
+
+    B: csc_array[np.float64]
+
+    @property
+    def size(self) -> int:
+        """Number of free unknowns."""
+        return int(self.B.shape[1])
+
+    @cached_property
+    def rows(self) -> csr_array[np.float64]:
+        """B', (m, n)."""
+        return csr_array(self.B.T)
+
+    @cached_property
+    def counts(self) -> Array:
+        """Number of unknowns of each column, of a basis of zeros and ones, (m,)."""
+        return np.asarray(self.B.sum(axis=0)).ravel()
+
+    def coordinates(self, w: Array) -> Array:
+        """Return z (m,) of unknowns w = B z, (n,), of a basis of zeros and ones."""
+        return np.asarray(self.rows @ w) / self.counts
+
+    def matrix(self, K: csc_array[np.float64]) -> csc_array[np.float64]:
+        """Return B' K B, (m, m), with the same pattern for the same pattern of K."""
+        if self._column is None:
+            return csc_array(self.rows @ K @ self.B)
+        pattern = self._patterns.get(K.nnz)
+        if pattern is None or not pattern.fits(K):
+            pattern = self._patterns[K.nnz] = _ReducedPattern.of(K, self._column, self.size)
+        return pattern.matrix(K)
+
+    def parts(self, fields: Sequence[Integers]) -> list[csr_array[np.float64]]:
+        """Return the columns of B' at the unknowns of each field."""
+        if not self._parts:
+            self._parts.extend(csr_array(self.rows[:, field]) for field in fields)
+        return self._parts
+
+    @cached_property
+    def _column(self) -> Integers | None:
+        """Column of the entry of each row, -1 for none; None if there are other entries than 1."""
+        by_row = csr_array(self.B)
+        if (np.diff(by_row.indptr) > 1).any() or (by_row.data != 1.0).any():
+            return None
+        column: Integers = np.full(by_row.shape[0], -1, dtype=np.int64)
+        column[np.diff(by_row.indptr) > 0] = by_row.indices
+        return column
+
+    @cached_property
+    def _patterns(self) -> dict[int, _ReducedPattern]:
+        return {}
+
+    @cached_property
+    def _parts(self) -> list[csr_array[np.float64]]:
+        return []
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For `copy` and `pickle`: without what only saves time."""
+        return {"B": self.B}
+
+
+@dataclass(frozen=True, eq=False)
+class _ReducedPattern:
+    """Pattern of B' K B for B of zeros and ones, and the positions of the entries of K in it.
+
+    full: indptr and indices of K. kept: entries of K that are in it. positions: of these.
+    """
+
+    full: tuple[Small, Small]
+    kept: Flags
+    positions: Integers
+    indptr: Small
+    indices: Small
+
+    @classmethod
+    def of(cls, K: csc_array[np.float64], column: Integers, size: int) -> _ReducedPattern:
+        """Of the pattern of K; column: (n,) of the entry of each row of B, -1 for none."""
+        rows, columns = (
+            column[K.indices],
+            column[np.repeat(np.arange(K.shape[1]), np.diff(K.indptr))],
+        )
+        kept = (rows >= 0) & (columns >= 0)
+        keys, positions = np.unique(columns[kept] * size + rows[kept], return_inverse=True)
+        indptr = np.searchsorted(keys, size * np.arange(size + 1)).astype(np.int32)
+        indices = (keys % max(size, 1)).astype(np.int32)
+        return cls((K.indptr, K.indices), kept, positions, indptr, indices)
+
+    def fits(self, K: csc_array[np.float64]) -> bool:
+        """True if K has this pattern."""
+        pairs = zip(self.full, (K.indptr, K.indices), strict=True)
+        return all(a is b or np.array_equal(a, b) for a, b in pairs)
+
+    def matrix(self, K: csc_array[np.float64]) -> csc_array[np.float64]:
+        """B' K B."""
+        entries: Any = np.bincount(self.positions, K.data[self.kept], len(self.indices))
+        data: Array = entries.astype(np.float64, copy=False)  # integers where there are none
+        size = len(self.indptr) - 1
+        return csc_array((data, self.indices, self.indptr), shape=(size, size))
+
+
+@dataclass(frozen=True, eq=False)
 class PeriodicProblem:
     """Equations B' R(B z + c) = 0, as Newton's method sees them.
 
-    basis, base: B (n, m) and c (n,). shift: the gradient (dim, dim) that c stands for.
+    base: c (n,). shift: the gradient (dim, dim) that c stands for.
     """
 
     problem: Problem
-    basis: csc_array[np.float64]
+    basis: Basis
     base: Array
     shift: Array
 
     def full(self, z: Array) -> Array:
         """All unknowns, (n,)."""
-        return np.asarray(self.basis @ z + self.base)
+        return np.asarray(self.basis.B @ z + self.base)
 
     def residual(self, z: Array) -> Array:
         """See `NonlinearProblem`."""
         x = self.full(z)
         r = self.problem.at(x).assembler.residual(x, self.problem.parameters)
-        return np.asarray(self.basis.T @ r)
+        return np.asarray(self.basis.rows @ r)
 
     def linearise(self, z: Array) -> tuple[Array, csc_array[np.float64]]:
         """See `NonlinearProblem`."""
         x = self.full(z)
         r, K = self.problem.at(x).assembler.linearise(x, self.problem.parameters)
-        return np.asarray(self.basis.T @ r), csc_array(self.basis.T @ K @ self.basis)
+        return np.asarray(self.basis.rows @ r), self.basis.matrix(K)
 
     def norm(self, r: Array) -> float:
         """Not used: residuals are measured relative to their forces."""
@@ -290,12 +454,13 @@ class PeriodicProblem:
         if rounded:
             noise = problem.noise(x, problem.assembler.linearise(x, problem.parameters)[1])
         worst = 0.0
-        for part in self.problem.layout.fields:
-            rows = self.basis[part]
-            rounding = np.asarray(abs(rows).T @ noise[part])
-            left = np.linalg.norm(np.maximum(np.abs(np.asarray(rows.T @ r[part])) - rounding, 0.0))
+        fields = self.problem.layout.fields
+        for part, rows in zip(fields, self.basis.parts(fields), strict=True):
+            balance = np.abs(np.asarray(rows @ r[part]))
+            if rounded:
+                balance = np.maximum(balance - np.asarray(abs(rows) @ noise[part]), 0.0)
             size = np.linalg.norm(forces[part])
-            worst = max(worst, float(left / size) if size > 0.0 else 0.0)
+            worst = max(worst, float(np.linalg.norm(balance) / size) if size > 0.0 else 0.0)
         return worst
 
 

@@ -14,6 +14,7 @@ from softehl.runtime.definition.problem_definition import (
 )
 from softehl.runtime.equations.system import System, contacts_with_history
 from softehl.runtime.equations.system_builder import build_system
+from softehl.runtime.kernels.constitutive_model import ModelKernel
 from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.solution import Point, Solution, Status
@@ -131,6 +132,9 @@ def _histories(target: System, source: System, state: dict[str, Array]) -> dict[
         if name not in target.blocks:
             continue
         block, old = target.blocks[name], source.blocks.get(name)
+        if isinstance(block.kernel, ModelKernel):
+            histories[name] = _model_states(block, old, initial, state)
+            continue
         common = [] if old is None else [n for n in block.kernel.history if n in old.kernel.history]
         if old is None or not common:
             continue
@@ -145,6 +149,21 @@ def _histories(target: System, source: System, state: dict[str, Array]) -> dict[
             column = old.kernel.point_data.index(n)
             histories[name][:, :, block.kernel.point_data.index(n)] = state[name][:, :, column]
     return histories
+
+
+def _model_states(
+    block: Block, old: Block | None, initial: Array, state: dict[str, Array]
+) -> Array:
+    """States of unit cells, whole; at rest where the result has no such cells."""
+    if old is None or not isinstance(old.kernel, ModelKernel):
+        return initial
+    _require_elements(block, old)
+    if old.kernel.signature != block.kernel.signature or state[block.name].shape != initial.shape:
+        raise StudyError(
+            f"start: {block.name!r} has other unit cells in the result; give it another name, or "
+            "start from rest"
+        )
+    return state[block.name]
 
 
 def _require_elements(block: Block, old: Block) -> None:

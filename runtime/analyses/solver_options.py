@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from softehl.runtime.analyses.callbacks import Callbacks, Progress, Series
-from softehl.runtime.definition.problem_definition import ProblemDefinition
+from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.equations.system import System
 from softehl.runtime.equations.system_builder import build_system
-from softehl.runtime.parallel.engine import AnyEngine, engine_of, note_of
+from softehl.runtime.kernels.constitutive_model import ModelKernel
+from softehl.runtime.parallel.engine import AnyEngine, Engine, Serial, engine_of, note_of
 from softehl.runtime.parallel.linear_solver_choice import Linear
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.newton import Newton
@@ -67,8 +68,21 @@ class SolverOptions:
         Raises StudyError.
         """
         engine = engine_of(self.engine, self.linear)
+        if not isinstance(engine, Serial):
+            _require_no_unit_cells(definition, engine)
         system = engine.spread(build_system(definition))
         return PreparedSystem(system, engine.newton(system, self.newton), note_of(engine), self)
+
+
+def _require_no_unit_cells(definition: ProblemDefinition, engine: Engine) -> None:
+    """Raise StudyError for unit cells, which other engines do not have."""
+    for block in definition.blocks.values():
+        if isinstance(block.kernel, ModelKernel):
+            raise StudyError(
+                f"{block.name!r} has unit cells, which {type(engine).__name__} does not solve: "
+                'leave engine out, and linear is "auto", "direct" or "amg"; processes=... of '
+                "study.add shares the cells"
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,3 +41,5 @@ element_file: LibraryEntry
 """The package sets it when it is imported."""
 load_page: PageLoader
 """`softehl.load_kernel`; the package sets it when it is imported."""
+stress_page: Path
+"""Model file of a body whose stress is data of its points; the package sets it."""

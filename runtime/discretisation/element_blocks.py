@@ -10,6 +10,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.mass import MassKernel
+from softehl.runtime.kernels.constitutive_model import ModelKernel
 from softehl.runtime.kernels.explanation import Explanation
 from softehl.runtime.kernels.kernel import Kernel, KernelError, Rule
 
@@ -206,7 +207,8 @@ class ElementBlock:
             Their positions.
         """
         n = len(self.dofs)
-        step = max(_PIECE // max(self.dofs.shape[1] ** 2, 1), _GROUP)
+        whole = isinstance(self.kernel, ModelKernel)  # which knows its states by their array
+        step = n if whole else max(_PIECE // max(self.dofs.shape[1] ** 2, 1), _GROUP)
         if n <= step:
             yield self, scatter
             return
@@ -301,6 +303,24 @@ class ElementBlock:
         for name, numbers in internal.items():
             by_name.setdefault(name, np.repeat(x[numbers][:, None], values.shape[1], axis=1))
         return by_name
+
+    def renewed(self, x: Array, parameters: Array) -> Array:
+        """Return the states after a step, of a kernel with a model at its points.
+
+        Parameters
+        ----------
+        x : array (size,)
+            Unknowns at the end of the step.
+        parameters : array (k,)
+            Parameters of the kernel.
+
+        Returns
+        -------
+        array (n, points, k)
+            States.
+        """
+        assert isinstance(self.kernel, ModelKernel)
+        return self.kernel.renewed(self.coordinates, self._gathered(x), **self.given(parameters))
 
     def explain(self, x: Array, parameters: Array, element: int) -> Explanation:
         """Return the named values of the page in one element, as `Kernel.explain`.

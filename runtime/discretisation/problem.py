@@ -560,6 +560,23 @@ class Problem:
         """
         return self.assembler.block(name).fields(x, self.parameters[name])
 
+    def renewed(self, name: str, x: Array) -> Array:
+        """Return the states of a block with a model at its points after a step.
+
+        Parameters
+        ----------
+        name : str
+            The block.
+        x : array (n,)
+            Unknowns at the end of the step.
+
+        Returns
+        -------
+        array (elements, points, k)
+            States.
+        """
+        return self.assembler.block(name).renewed(x, self.parameters[name])
+
     def _changed(self, name: str, values: Mapping[str, float]) -> Array:
         require_known("block", [name], [block.name for block in self.assembler.blocks])
         block = self.assembler.block(name)

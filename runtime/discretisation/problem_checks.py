@@ -10,6 +10,7 @@ import numpy as np
 
 from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.kernels.constitutive_model import ModelKernel
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.kernels.run_time_arrays import is_packed, unpacked
 from softehl.runtime.kernels.tables import points_of, with_ends
@@ -174,6 +175,9 @@ def fault_message(
     A path cuts its steps where a residual is not finite, and asks each time: of a page whose
     evaluation takes longer than `_PATIENCE`, `known` keeps the first answer.
     """
+    if isinstance(block.kernel, ModelKernel):
+        arguments = block.given(parameters)
+        return f": {block.kernel.fault(block.coordinates, x[block.dofs], row, **arguments)}"
     if block.name in known:
         return known[block.name]
     begin = perf_counter()

@@ -24,6 +24,7 @@ from softehl.runtime.discretisation.communicator import SERIAL, Communicator
 from softehl.runtime.discretisation.dofmap import Numbering
 from softehl.runtime.discretisation.loads import Tie, amount
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.kernels.constitutive_model import ModelKernel
 from softehl.runtime.kernels.run_time_arrays import packed
 from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.suggestions import short_list
@@ -202,7 +203,9 @@ class System:
         after = dict(previous)
         for block in self.blocks.values():
             names = block.kernel.history
-            if names:
+            if isinstance(block.kernel, ModelKernel):
+                after[block.name] = problem.renewed(block.name, x)
+            elif names:
                 fields = problem.fields(block.name, x)
                 state = previous[block.name].copy()
                 for name in names:

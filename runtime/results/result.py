@@ -26,6 +26,7 @@ from softehl.runtime.equations.interpolation import (
 )
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.stability import negative_directions
+from softehl.runtime.kernels.constitutive_model import ModelKernel, PointState
 from softehl.runtime.kernels.explanation import Explanation
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError, place_text
@@ -342,6 +343,42 @@ class Result:
         self._block(block)
         comm = self.system.comm
         return {n: comm.gather_cells(block, v) for n, v in self._local_fields(block).items()}
+
+    def unit_cell(self, block: str, element: int, point: int = 0) -> PointState:
+        """Return the unit cell at an integration point of a body with `cell=...`.
+
+        Parameters
+        ----------
+        block : str
+            Name of the block.
+        element : int
+            Number of the element in its block.
+        point : int
+            Number of the integration point.
+
+        Returns
+        -------
+        Homogenised
+            Mean gradient F, stress P, moduli A, and `result` of the cell.
+
+        Raises
+        ------
+        StudyError
+            The block has no unit cells, or no such element or point.
+        """
+        kernel = self._block(block).kernel
+        if not isinstance(kernel, ModelKernel):
+            raise StudyError(f"unit_cell: {block!r} has none: it was not added with cell=...")
+        elements = self.problem.assembler.block(block)
+        counts = len(elements.dofs), self.histories[block].shape[1]
+        if not (0 <= element < counts[0] and 0 <= point < counts[1]):
+            raise StudyError(
+                f"unit_cell: element {element}, point {point}: {block!r} has {counts[0]} elements "
+                f"of {counts[1]} points, counted from 0"
+            )
+        arguments = elements.given(self.problem.parameters[block])
+        dofs = self.point.solution.x[elements.dofs]
+        return kernel.state(elements.coordinates, dofs, element, point, **arguments)
 
     def _block(self, name: str) -> Block:
         """The block of a name, of all processes.  Raises KeyError that names what there is."""

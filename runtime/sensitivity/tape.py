@@ -12,6 +12,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import Step, System
+from softehl.runtime.kernels.constitutive_model import ModelKernel
 from softehl.runtime.solve.linear.linear_solver import LinearSolver
 from softehl.runtime.solve.singularity_check import LastFactorisation
 
@@ -74,6 +75,12 @@ class Tape:
         or the study was changed.
         """
         system = self.system
+        for block in system.blocks.values():
+            if isinstance(block.kernel, ModelKernel):
+                raise StudyError(
+                    f"derivatives, fits and gradients: {block.name!r} has unit cells, through "
+                    "which nothing is differentiated; take differences of results"
+                )
         if not isinstance(self.distributed_problem, Problem | WithoutMatrix):
             raise StudyError(
                 'derivatives need engine="serial": this result is of several processes'

@@ -487,6 +487,7 @@ def _element_file(name: str) -> tuple[Path, tuple[str, ...]]:
 
 
 page_loader.element_file = _element_file
+page_loader.stress_page = Path(__file__).parent / "codegen" / "models" / "linearised_stress.py"
 
 from softehl.runtime.kernels import page_evaluator  # noqa: E402
 

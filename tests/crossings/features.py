@@ -134,6 +134,28 @@ class LawAtPoints(Law):
         return load_kernel(self.page, cell=cell, geometry=geometry, varying=moved)
 
 
+@dataclass(frozen=True, eq=False)
+class UnitCells(Law):
+    """A cell of the law at every point."""
+
+    def add(
+        self,
+        study: Study,
+        name: str = "body",
+        cells: str | None = None,
+        *,
+        again: bool = False,
+        **constants: float,
+    ) -> None:
+        """See `Law`."""
+        plane = study.mesh.dimension == 2
+        mesh = Mesh.rectangle(1, 1, cells=(2, 1)) if plane else Mesh.box((1, 1, 1), cells=(2, 1, 1))
+        cell = Study(mesh)
+        super().add(cell, again=again, **constants)
+        pairs = [("left", "right"), ("bottom", "top"), ("front", "back")]
+        study.add(name, cell=cell.periodic(*pairs[: mesh.dimension]), cells=cells)
+
+
 _RUBBER = {"mu": 0.4, "lame": 0.6}
 _MIXED = {"mu": 0.4, "K": 5.0}
 _OGDEN = {"mu_1": 0.5, "alpha_1": 1.6, "mu_2": -0.04, "alpha_2": -2.0, "mu_3": 0.01, "alpha_3": 4.0}
@@ -176,6 +198,7 @@ LAWS = {
         history=True,
         parameter="G",
     ),
+    "unit cells": UnitCells(_RUBBER, pages.energy),
 }
 """Ways to write the body."""
 

@@ -27,6 +27,20 @@ def _again(at: Problem) -> bool:
 
 
 REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
+    ((), lambda at: at.law == "unit cells" and at.geometry == "axisymmetric", "in plane strain"),
+    (("large ring",), lambda at: at.law == "unit cells", "in plane strain"),
+    (
+        (),
+        lambda at: (
+            at.law == "unit cells" and at.solver == "matrix-free" and at.analysis != "follow"
+        ),
+        "MatrixFree does not solve",
+    ),
+    (
+        ("sensitivity", "hessian"),
+        lambda at: at.law == "unit cells" and not _moves(at),
+        "through which nothing is differentiated",
+    ),
     ((), lambda at: at.solver == "matrix-free" and at.analysis == "follow", "it factorises"),
     ((), lambda at: at.solver == "amg" and at.analysis == "follow", "it factorises"),
     ((), lambda at: at.solver == "matrix-free" and at.law != "product", "no product by sum"),

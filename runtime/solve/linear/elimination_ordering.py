@@ -98,9 +98,14 @@ class PermutedFactors:
     order: EliminationOrder
     factors: Factors
 
+    @property
+    def takes_columns(self) -> bool:
+        """True if `solve` takes b (n, k), too."""
+        return isinstance(self.factors, SuperLU)
+
     def solve(self, b: Array) -> Array:
         """x of K x = b, shapes (n,)."""
-        x = np.empty(len(b))
+        x = np.empty(b.shape)
         x[self.order.unknowns] = self.factors.solve(b[self.order.unknowns])
         return x
 

@@ -117,6 +117,17 @@ class Factorisation:
         rows, columns = self.units
         return columns * self._solved(rows * b)
 
+    def solve_columns(self, b: Array) -> Array:
+        """x of matrix x = b, shapes (n, k); at once where the factors can.  Raises SingularMatrix
+        as `solve`.
+        """
+        if not getattr(self.factors, "takes_columns", False):
+            return np.stack([self.solve(column) for column in b.T], axis=1)
+        if self.units is None:
+            return self._solved(b)
+        rows, columns = self.units
+        return np.asarray(columns[:, None] * self._solved(rows[:, None] * b))
+
     def _solved(self, b: Array) -> Array:
         x: Array = self.factors.solve(b)
         correction = 0.0
@@ -128,7 +139,8 @@ class Factorisation:
             raise SingularMatrix("the linear solution is not finite: a pivot vanished")
         if correction > self.settled * float(np.abs(x).max(initial=0.0)):
             raise SingularMatrix("the linear solution does not settle: the matrix is singular")
-        error = self._backward_error(x, b)
+        pairs = [(x, b)] if b.ndim == 1 else zip(x.T, b.T, strict=True)
+        error = max(self._backward_error(*pair) for pair in pairs)
         if error > self.accuracy:
             raise SingularMatrix(
                 f"the linear solution has a backward error of {error:.1e} (allowed "
@@ -164,6 +176,13 @@ class Factorisation:
         defect = np.abs(b - self.matrix @ x)
         ratio = np.divide(defect, scale, out=np.zeros_like(defect), where=scale > 0.0)
         return float(ratio.max(initial=0.0))
+
+
+def solved_columns(factors: Factors, b: Array) -> Array:
+    """x of K x = b, shapes (n, k); at once where the factors can."""
+    if isinstance(factors, Factorisation):
+        return factors.solve_columns(b)
+    return np.stack([factors.solve(column) for column in b.T], axis=1)
 
 
 def equilibrate(K: SparseMatrix) -> tuple[SparseMatrix, Array, tuple[Array, Array] | None]:
