@@ -37,6 +37,10 @@ SAFE = 0.9
 _ACCURATE = 1e-3  # relative error of the highest frequency, far below what SAFE leaves
 _APART = 1e-9  # of the size of the mesh: a tie that opens by more does not hold
 _SAME = 1e-6  # of the largest pressure: pressures of a start that differ by less are its own
+_REMEDY = (
+    'give contacts a smaller stiffness=..., or take method = "midpoint", which conserves energy, '
+    'or "generalised-alpha" with rho_inf = 0, which damps most'
+)
 _SHORTER = 2.0  # times: a penalty that shortens stable steps by more is reported
 
 
@@ -78,7 +82,7 @@ class ExplicitMarch:
 
     def run(self, until: float) -> Iterator[Motion]:
         """Results every dt until the end.  Raises StudyError, NotConverged."""
-        ledger = EnergyBalance(self.body.comm)
+        ledger = EnergyBalance(self.body.comm, remedy=_REMEDY)
         begin = self.body.at_end(self.state.ended_step(self.dt), self.state.v)
         self._energies(begin, ledger)
         end, stable = begin, self._stable(begin)

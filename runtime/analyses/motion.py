@@ -289,7 +289,7 @@ class EnergyBalance:
 
     comm: of the processes, of which each knows the work of its elements. largest: sum of the
     sizes of kinetic, internal and external energy so far. latest: what the last steps have gained;
-    less counts where a motion begins from nothing, or is damped at once.
+    less counts where a motion begins from nothing, or is damped at once. remedy: against a gain.
     """
 
     comm: Communicator
@@ -299,6 +299,10 @@ class EnergyBalance:
     largest: float = 0.0
     latest: list[float] = field(default_factory=list)
     warned: bool = False
+    remedy: str = (
+        'take a shorter dt, or method = "midpoint", which conserves energy, or "generalised-alpha" '
+        "with rho_inf = 0, which damps most"
+    )
 
     def add(self, forces: Forces, supports: Array, displacement: Array) -> None:
         """Work of forces, mean of a step, and of supports (n,), as the unknowns moved (n,).
@@ -331,8 +335,7 @@ class EnergyBalance:
             self.warned = True
             warn(
                 f"t = {t:.6g}: {balance / self.largest:.0%} of the energy of the motion come from "
-                'the scheme, not from loads: take a shorter dt, or method = "midpoint", which '
-                'conserves energy, or "generalised-alpha" with rho_inf = 0, which damps most',
+                f"the scheme, not from loads: {self.remedy}",
                 EnergyGain,
                 stacklevel=2,
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -211,8 +212,23 @@ def test_two_bars_are_pulled_apart() -> None:
     assert forces[-1] < 0.1 * STRENGTH
 
 
+def test_arc_length_goes_over_the_strength() -> None:
+    """Control of the length follows the fall of the force, where load steps may jump."""
+    path = pulled().follow(step=0.05, until=lambda r: r.t > 1.0)
+    forces = [result.reaction("upper:top")["u_y"] for result in path.results]
+    assert max(forces) == pytest.approx(STRENGTH, rel=1e-3)
+    assert forces[-1] < 0.1 * STRENGTH
+
+
 def worn(steps: int, **given: Any) -> Result:
     """A block under a dead load on a plate that is drawn away beneath it."""
+    study = wearing()
+    pressed = study.solve()
+    return study.solve(steps=steps, start=pressed, until=2.0, **given)
+
+
+def wearing() -> Study:
+    """The study of `worn`: it presses until 1, then it draws."""
     plate = Mesh.rectangle(3, 0.2, cells=(10, 1))
     block = Mesh.rectangle(1, 0.5, cells=(3, 1)).map(lambda x: x + np.array([0.2, 0.199]))
     study = Study(Mesh.union(block=block, plate=plate))
@@ -221,8 +237,7 @@ def worn(steps: int, **given: Any) -> Result:
     study.fix("plate", u_x=lambda x, t: -1.5 * max(t - 1, 0), u_y=0)
     study.fix("block", u_x=0)
     study.load("block:top", u_y=lambda x, t: np.full(len(x), -0.5 * min(t, 1)))
-    pressed = study.solve()
-    return study.solve(steps=steps, start=pressed, until=2.0, **given)
+    return study
 
 
 def test_archard_wears_by_pressure_times_way() -> None:
@@ -235,6 +250,17 @@ def test_archard_wears_by_pressure_times_way() -> None:
     np.testing.assert_allclose(found["worn"], depth, rtol=1e-8)
     bottom = result.values("u_y")[result.system.mesh.nodes("block:bottom")]
     np.testing.assert_allclose(bottom, 0.001 - 0.5 / 50 - depth * 4 / 5, rtol=1e-8)
+
+
+def test_history_of_a_law_goes_on_from_a_checkpoint(tmp_path: Path) -> None:
+    """Bitwise, as if the march had not stopped."""
+    given: dict[str, Any] = {"dt": 0.25, "method": "euler"}
+    *_, whole = wearing().march(until=2.0, **given)
+    list(wearing().march(until=1.5, checkpoint=tmp_path / "worn.npz", **given))
+    *_, last = wearing().march(until=2.0, checkpoint=tmp_path / "worn.npz", **given)
+    assert np.array_equal(last.x, whole.x)
+    assert np.array_equal(last.fields("seat")["worn"], whole.fields("seat")["worn"])
+    assert last.fields("seat")["worn"].min() > 0.014
 
 
 def test_what_cannot_be_a_law_is_refused() -> None:
