@@ -31,6 +31,7 @@ from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.analyses.time_integrators import MethodName, TimeIntegrator
 from softehl.runtime.analyses.two_scales import add_unit_cells
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.contact.rigid_surfaces import Cylinder, Plane, Polyline, Sphere
 from softehl.runtime.definition import loads_and_supports
 from softehl.runtime.definition.contact_sides import add_contact
 from softehl.runtime.definition.element_blocks import (
@@ -49,6 +50,7 @@ from softehl.runtime.definition.problem_definition import (
     StudyError,
     Where,
 )
+from softehl.runtime.definition.rigid_bodies import add_rigid_body
 from softehl.runtime.discretisation.loads import Amount
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.system import System
@@ -115,6 +117,7 @@ class Study:
         blocks = short_list(f"{b.name} ({b.kernel.name})" for b in definition.blocks.values())
         calls = Counter(["fix"] * len(definition.conditions) + [f.what for f in definition.forces])
         calls.update(start=len(definition.start), contact=len(definition.contacts))
+        calls.update(rigid=len(definition.rigids))
         summary = (
             ", ".join(f"{count} {name}" for name, count in calls.items() if count) or "no loads"
         )
@@ -367,13 +370,64 @@ class Study:
             self._definition, where, to, names, offset=offset, tolerance=tolerance
         )
 
+    def rigid(
+        self,
+        where: Where | None = None,
+        *,
+        at: Sequence[float] | None = None,
+        name: str = "rigid",
+        rotations: Literal["finite", "small"] = "finite",
+        of: Sequence[str] | None = None,
+    ) -> str:
+        """Let a side or a group move as a rigid body, and return the name of the body.
+
+        `fix`, `load` and `spring` take this name: u_x, u_y and theta are the displacement and the
+        angle of the body in 2-D; u_x, u_y, u_z and theta_x, theta_y, theta_z, a rotation vector, in
+        3-D. `Result.at(name)` has its motion, `Result.reaction(name)` force and moment.
+
+        Parameters
+        ----------
+        where : str, callable, tuple of float or array of int, optional
+            A side, a group, a predicate of coordinates, or node numbers. Left out, the body has no
+            nodes: it moves the surface of a contact.
+        at : tuple of float, optional
+            Reference point (dim,) [mm], where forces and moments act; the middle of the box around
+            the nodes if left out.
+        name : str
+            Name of the body.
+        rotations : str
+            "finite", or "small" for pages of small strain: the constraint is then linear.
+        of : sequence of str, optional
+            Displacements along x, y, z; u_x, u_y, u_z if left out.
+
+        Returns
+        -------
+        str
+            The name.
+
+        Raises
+        ------
+        StudyError
+            The name is taken, or the nodes leave a rotation undetermined.
+        MeshError
+            The mesh has no such side or node.
+
+        Notes
+        -----
+        A load on theta is a moment [N mm]; in 3-D about an axis that does not turn. Moments and
+        angles of plane strain are per thickness. Rotation vectors stay below a full turn, unless
+        all three components are prescribed. Cells of a rigid group need no page.
+        """
+        return add_rigid_body(self._definition, where, at=at, name=name, rotations=rotations, of=of)
+
     def contact(
         self,
         side: str | Predicate,
-        other: str | Predicate | None = None,
+        other: str | Predicate | Plane | Sphere | Cylinder | Polyline | None = None,
         *,
         friction: float | None = None,
         name: str = "contact",
+        body: str | None = None,
         of: Sequence[str] | None = None,
         stiffness: float | None = None,
         depth: float | None = None,
@@ -382,27 +436,30 @@ class Study:
         reach: float | None = None,
         **parameters: Number,
     ) -> None:
-        """Add contact with finite sliding between two sides, or of one side with itself.
+        """Add contact with finite sliding: of two sides, a side with itself, or a rigid surface.
 
         Parameters
         ----------
         side : str or callable
             Side with the contact pressure as an unknown: the finer or the softer one.
             `Result.fields(name)` has its pressure and shear stress.
-        other : str or callable, optional
-            The other side; left out, `side` is in contact with itself.
+        other : str, callable or surface, optional
+            The other side, or a rigid surface: `Plane`, `Sphere`, `Cylinder` or `Polyline`. Left
+            out, `side` is in contact with itself.
         friction : float, optional
             Coulomb's coefficient of friction; 0 if left out.
         name : str
             Name of the block.
+        body : str, optional
+            Rigid body, by the name of `rigid`, with which the surface moves; at rest if left out.
         of : sequence of str, optional
             Displacements along x, y, z; u_x, u_y, u_z if left out.
         stiffness : float, optional
             Of the augmented Lagrangian [MPa/mm]. It changes the iterations, not the result; derived
             from the bodies if left out.
         depth : float, optional
-            Penetration above which sides are not in contact [mm]; half of the body's thickness if
-            left out.
+            Penetration above which sides are not in contact [mm]; the thickness of the body if left
+            out, for a rigid surface any.
         law : page, optional
             Law of contact in place of impenetrability and Coulomb's friction: a page, or its file,
             that says with `m.gap`, `m.slip` and `m.jump(T)` what acts between a point of the first
@@ -428,6 +485,7 @@ class Study:
             name,
             (side, other),
             of,
+            body=body,
             law=law,
             model=model,
             parameters=parameters,
@@ -974,7 +1032,7 @@ class Study:
         what: str | UserFunction,
         *,
         by: By,
-        at: tuple[float, ...] | None = None,
+        at: tuple[float, ...] | str | None = None,
         reaction: str | None = None,
         **path: Any,
     ) -> Objective:

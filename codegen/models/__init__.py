@@ -17,6 +17,7 @@ from softehl.codegen.models import (
     mortar_3d,
     restraints,
     rheology,
+    rigid,
     solid,
 )
 
@@ -55,6 +56,9 @@ ALL: dict[str, Callable[[], Definition]] = {
     **{f"mortar_side_{a}": partial(mortar_2d.side, a) for a in (2, 3)},
     "touch": mortar_3d.touch,
     **{f"touch_side_{a}": partial(mortar_3d.face, a) for a in (3, 4, 6, 8, 9)},
+    **{f"rigid_link_{d}": partial(rigid.link, d) for d in (2, 3)},
+    "rigid_moment": rigid.moment,
+    **{f"rigid_touch_{d}": partial(rigid.touch, d) for d in (2, 3)},
     "film": film.reynolds_segment,
     "film_upwind": film.bubble_load,
     "film_facet": film.reynolds_facet,

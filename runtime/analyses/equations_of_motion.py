@@ -24,6 +24,7 @@ from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Tie
 from softehl.runtime.discretisation.mass import MassKernel, lumped
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.reduced_tangent import is_motion
 from softehl.runtime.equations.contact_setup import weighted
 from softehl.runtime.equations.mass_matrix import Masses, mass_blocks, mass_matrix
 from softehl.runtime.equations.system import Step, System
@@ -283,8 +284,13 @@ def _scaled(block: ElementBlock, factors: Array) -> ElementBlock:
 def _multipliers(
     system: System, problem: Problem, x: Array, heavy: Flags, roles: EnergyRoles
 ) -> Flags:
-    """Unknowns (n,) of pages without mass that stand in no equation without mass, at x, (n,)."""
+    """Unknowns (n,) of pages without mass that stand in no equation without mass, at x, (n,).
+
+    Those of the motion of rigid bodies, which have no mass, are none.
+    """
     massless = ~heavy
+    for name in filter(is_motion, system.numbering.layout.names):
+        massless[system.numbering.layout.part(name)] = False
     massless[problem.fixed] = massless[roles.multipliers] = False
     if not system.comm.max(float(massless.any())):
         return massless

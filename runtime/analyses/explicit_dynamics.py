@@ -23,6 +23,7 @@ from softehl.runtime.analyses.motion import (
 from softehl.runtime.analyses.time_integrators import ROUNDING, CentralDifference
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.contact.penalty import frequency_squared, lumped_areas
+from softehl.runtime.contact.rigid_contact import RigidContact
 from softehl.runtime.contact.search import ContactProblem
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.discretisation.constraints import Constraints
@@ -299,8 +300,14 @@ class _ContactUnknowns:
         """Energy of the penalties, p^2 / (2 rho) over the contact, at x, (n,).
 
         Forces p n and -p n at points that are g n apart, times their places, are p g per area.
+        Those of rigid surfaces have no partner.
         """
-        return 0.5 * float(forces.contact @ (self.places + x))
+        forces_of_pairs, energy = forces.contact, 0.0
+        for contact in self.body.static_system.contacts:
+            if isinstance(contact, RigidContact):
+                own_forces, own_energy = contact.penalty_forces(x)
+                forces_of_pairs, energy = forces_of_pairs - own_forces, energy + own_energy
+        return energy + 0.5 * float(forces_of_pairs @ (self.places + x))
 
     def frequency_squared(self, problem: Problem) -> float:
         """Bound of that of the penalties."""

@@ -152,7 +152,7 @@ class EnergyRoles:
         names = contact_blocks(system)
         roles: dict[str, Role] = {}
         multipliers = [c.multipliers[c.multipliers >= 0] for c in system.contacts]
-        bound = [n[n >= 0] for n in (c.displacements[c.nodes] for c in system.contacts)]
+        bound = [c.bound for c in system.contacts]
         for block in system.assembler.blocks:
             kernel, page = block.kernel, system.blocks.get(block.name)
             if block.name in names:

@@ -302,6 +302,11 @@ class LawContact:
         return self.search.nodes
 
     @property
+    def bound(self) -> Integers:
+        """See `StateDependentBlocks`."""
+        return self.search.bound
+
+    @property
     def history_names(self) -> tuple[str, ...]:
         """Names of its history."""
         return next(iter(self.kernels.values())).history

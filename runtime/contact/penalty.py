@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.contact.rigid_contact import RigidContact
 from softehl.runtime.contact.search import Contact, FaceContact
 from softehl.runtime.mesh.cells import CELLS, measures
+
+AnyContact: TypeAlias = Contact | FaceContact | RigidContact
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +54,16 @@ class PenaltyKernel:
         return dofs
 
 
-def with_penalty(contact: Contact | FaceContact) -> Contact | FaceContact:
+def with_penalty(contact: AnyContact) -> AnyContact:
     """The contact with kernels of a penalty."""
+    if isinstance(contact, RigidContact):
+        return replace(
+            contact,
+            kernels={
+                kind: PenaltyKernel(kernel, kernel.pressures)
+                for kind, kernel in contact.kernels.items()
+            },
+        )
     dimension, count = contact.displacements.shape[1], contact.multipliers.shape[1]
     kernels = {}
     for (a, b), kernel in contact.kernels.items():
@@ -62,9 +73,7 @@ def with_penalty(contact: Contact | FaceContact) -> Contact | FaceContact:
     return replace(contact, kernels=kernels)  # type: ignore[arg-type]
 
 
-def frequency_squared(
-    contacts: Sequence[Contact | FaceContact], masses: Array, fixed: Flags
-) -> float:
+def frequency_squared(contacts: Sequence[AnyContact], masses: Array, fixed: Flags) -> float:
     """Bound of the square of the highest angular frequency of the penalties alone [1/s^2].
 
     masses, fixed: (n,) of the unknowns; fixed ones do not move. Of every contact the bound is the
@@ -78,16 +87,20 @@ def frequency_squared(
         second = [(kind, faces, np.full(len(faces), largest)) for kind, faces in contact.others]
         both = 0.0
         for side in (first, second):
-            both += max(
-                _largest_ratio(contact, kind, faces, rho, masses=masses, fixed=fixed)
-                for kind, faces, rho in side
+            both += (
+                max(
+                    _largest_ratio(contact, kind, faces, rho, masses=masses, fixed=fixed)
+                    for kind, faces, rho in side
+                )
+                if side
+                else 0.0
             )
         at_nodes[contact.nodes] += both
     return float(at_nodes.max(initial=0.0))
 
 
 def _largest_ratio(
-    contact: Contact | FaceContact,
+    contact: AnyContact,
     kind: str,
     faces: Integers,
     rho: Array,
@@ -96,7 +109,7 @@ def _largest_ratio(
     fixed: Flags,
 ) -> float:
     """Largest row sum of rho times products of shape functions, over the mass of its node."""
-    cell, ring = CELLS[kind], isinstance(contact, Contact) and contact.ring
+    cell, ring = CELLS[kind], not isinstance(contact, FaceContact) and contact.ring
     at, weights = cell.measured_rule(2 * cell.order, ring=ring)
     points, N = contact.points[faces], cell.shape(at)
     density = measures(cell, points, at) * weights

@@ -74,6 +74,11 @@ class Contact:
         """Of all its faces."""
         return nodes_of(self.sides, self.others)
 
+    @property
+    def bound(self) -> Integers:
+        """Numbers of the unknowns on which it acts."""
+        return bound_unknowns(self)
+
     def empty(self) -> list[ElementBlock]:
         """Its blocks without elements, which keep their places."""
         none = np.empty(0, dtype=np.int64)
@@ -208,6 +213,12 @@ def nodes_of(sides: Sequence[ContactSide], others: Sequence[tuple[str, Integers]
     return np.unique(np.concatenate([f.ravel() for f in faces]))
 
 
+def bound_unknowns(contact: Contact | FaceContact) -> Integers:
+    """Numbers of the displacements of all nodes of a contact."""
+    dofs = contact.displacements[contact.nodes]
+    return np.asarray(dofs[dofs >= 0])
+
+
 def max_step(sides: Sequence[ContactSide]) -> float:
     """Largest motion in an iteration that contact search still detects."""
     return _STRIDE * float(np.median(np.concatenate([side.depth for side in sides])))
@@ -234,6 +245,11 @@ class StateDependentBlocks(Protocol):
     @property
     def nodes(self) -> Integers:
         """Of all its faces."""
+        ...
+
+    @property
+    def bound(self) -> Integers:
+        """Numbers of the unknowns on which it acts."""
         ...
 
     def empty(self) -> list[ElementBlock]:
@@ -358,6 +374,11 @@ class FaceContact:
     def nodes(self) -> Integers:
         """Of all its faces."""
         return nodes_of(self.sides, self.others)
+
+    @property
+    def bound(self) -> Integers:
+        """Numbers of the unknowns on which it acts."""
+        return bound_unknowns(self)
 
     def empty(self) -> list[ElementBlock]:
         """Its blocks without elements, which keep their places."""

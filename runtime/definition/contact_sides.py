@@ -8,6 +8,8 @@ from typing import Any
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.contact.body_thickness import by_normals, in_chains
+from softehl.runtime.contact.rigid_contact import face_rule
+from softehl.runtime.contact.rigid_surfaces import Surface
 from softehl.runtime.definition.argument_checks import finite
 from softehl.runtime.definition.element_blocks import page_on
 from softehl.runtime.definition.kernel_loading import KernelOrigin
@@ -19,7 +21,7 @@ from softehl.runtime.definition.problem_definition import (
     StudyError,
     display_name,
 )
-from softehl.runtime.kernels.kernel import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, Rule, load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, Predicate
 from softehl.runtime.suggestions import did_you_mean, join_names
@@ -58,7 +60,8 @@ class ContactRequest:
     labels: of the blocks of its sides, one for each kind; none with a law. faces: of the first side
     by kind, other_faces: those that it may meet. names: of the displacements; named: as given.
     alone: both are one surface. stiffness, depth, reach: None: derived. friction: with a law 1
-    unless that is conservative.
+    unless that is conservative. surface: of a rigid body, in place of another side; body: its name,
+    None where it is at rest.
     """
 
     name: str
@@ -74,6 +77,8 @@ class ContactRequest:
     depth: float | None
     reach: float | None = None
     law: LawRequest | None = None
+    surface: Surface | None = None
+    body: str | None = None
 
     def unknown(self, multiplier: str) -> str:
         """Name of an unknown of the contact."""
@@ -83,22 +88,31 @@ class ContactRequest:
 def add_contact(
     definition: ProblemDefinition,
     name: str,
-    sides: tuple[str | Predicate, str | Predicate | None],
+    sides: tuple[str | Predicate, str | Predicate | Surface | None],
     of: Sequence[str] | None,
     *,
+    body: str | None = None,
     law: object = None,
     model: str | None = None,
     parameters: Mapping[str, Any],
     **coefficients: float | None,
 ) -> None:
-    """Add contact between two sides; see `Study.contact`.
+    """Add contact between two sides, or a side and a rigid surface; see `Study.contact`.
 
     coefficients: friction, stiffness, depth, reach.
     """
     taken = [*definition.blocks, *(contact.name for contact in definition.contacts)]
     if name in taken:
         raise StudyError(f"contact(name={name!r}): the name is taken; blocks: {join_names(taken)}")
-    context = f"contact({', '.join(display_name(s) for s in sides if s is not None)})"
+    side, other = sides
+    surface: Surface | None = None
+    meeting: tuple[str | Predicate, str | Predicate | None] = side, None
+    if other is None or isinstance(other, str) or callable(other):
+        meeting = side, other
+    else:
+        surface = other
+    shown = display_name(side) if other is None else f"{display_name(side)}, {_other_name(other)}"
+    context = f"contact({shown})"
     if law is None and parameters:
         raise StudyError(
             f"{context}: {join_names(parameters)}: only a law, law=page, has parameters"
@@ -108,15 +122,35 @@ def add_contact(
             f"{context}: reach = {coefficients['reach']:g}: only a law, law=page, has it"
         )
     if law is not None:
+        if surface is not None:
+            raise StudyError(
+                f"{context}: a law, law=page, is for two sides: give a side in place of the "
+                "surface, that of a group which study.rigid moves"
+            )
         for key in ("friction", "stiffness"):
             if coefficients[key] is not None:
                 raise StudyError(f"{context}: {key} = {coefficients[key]:g}: a law states its own")
-    contact, blocks = _contact_and_sides(definition, name, sides, of, coefficients, law is None)
+    contact, blocks = _contact_and_sides(
+        definition, name, meeting, of, coefficients, with_blocks=law is None, surface=surface
+    )
     if law is not None:
         request = _law(definition, context, (law, model), parameters)
         contact = replace(contact, law=request, friction=float(not request.conservative))
+    if surface is None and body is not None:
+        raise StudyError(
+            f"{context}: body={body!r} moves a surface: name one in place of the other side, as in "
+            "softehl.Sphere(centre, radius)"
+        )
+    if surface is not None:
+        _require_surface(definition, contact, surface, body)
+        contact = replace(contact, surface=surface, body=body, other_faces=(), alone=False)
     definition.blocks.update(blocks)
     definition.contacts.append(contact)
+
+
+def _other_name(other: str | Predicate | Surface) -> str:
+    """The other side or surface, for messages."""
+    return display_name(other) if isinstance(other, str) or callable(other) else repr(other)
 
 
 def _law(
@@ -157,11 +191,15 @@ def _contact_and_sides(
     sides: tuple[str | Predicate, str | Predicate | None],
     of: Sequence[str] | None,
     coefficients: Mapping[str, float | None],
+    *,
     with_blocks: bool,
+    surface: Surface | None,
 ) -> tuple[ContactRequest, dict[str, Block]]:
     """A contact and the blocks of its sides.  Raises StudyError, MeshError."""
     mesh, axisymmetric = definition.mesh, definition.axisymmetric
-    context = f"contact({', '.join(display_name(s) for s in sides if s is not None)})"
+    shown = [display_name(s) for s in sides if s is not None]
+    shown += [] if surface is None else [repr(surface)]
+    context = f"contact({', '.join(shown)})"
     mesh.require_whole(context)
     if mesh.dimension not in KINDS:
         raise StudyError(f"{context}: contact is for meshes in 2-D and 3-D, this one is a line")
@@ -179,7 +217,7 @@ def _contact_and_sides(
     side, other = sides
     side_faces = mesh.outer_faces(side)
     other_faces = side_faces if other is None or other == side else mesh.outer_faces(other)
-    alone = other_faces is side_faces
+    alone = other_faces is side_faces and surface is None
     for kind in (*side_faces, *other_faces):
         if kind not in KINDS[mesh.dimension]:
             raise StudyError(
@@ -190,7 +228,8 @@ def _contact_and_sides(
     blocks = {}
     for kind, faces in side_faces.items() if with_blocks else ():
         label = name if len(side_faces) == 1 else f"{name}:{kind}"
-        blocks[label] = _block(mesh, name, label, (kind, faces), names, float(axisymmetric))
+        rule = None if surface is None else face_rule(kind)
+        blocks[label] = _block(mesh, name, label, (kind, faces), names, float(axisymmetric), rule)
     contact = ContactRequest(
         name=name,
         labels=(*blocks,),
@@ -208,6 +247,34 @@ def _contact_and_sides(
     return contact, blocks
 
 
+def _require_surface(
+    definition: ProblemDefinition, contact: ContactRequest, surface: Surface, body: str | None
+) -> None:
+    """Raise StudyError for a surface or a body that does not fit."""
+    mesh, context = definition.mesh, f"contact({contact.name!r})"
+    if not hasattr(surface, "nearest"):
+        raise StudyError(
+            f"{context}: {surface!r} is no side and no surface: a surface is Plane, Sphere, "
+            "Cylinder or Polyline of softehl"
+        )
+    if surface.dimension != mesh.dimension:
+        raise StudyError(
+            f"{context}: {surface!r} has {surface.dimension} coordinates, the mesh has "
+            f"{mesh.dimension}"
+        )
+    if body is not None and body not in definition.rigids:
+        existing = join_names(definition.rigids) or "none"
+        raise StudyError(
+            f"{context}: there is no rigid body {body!r}, but {existing}: make it before, "
+            f"study.rigid(at=..., name={body!r})"
+        )
+    if body is not None and not definition.rigids[body].finite:
+        raise StudyError(
+            f'{context}: the rigid body {body!r} has rotations="small", and surfaces turn by '
+            "finite ones: leave rotations out"
+        )
+
+
 def _in_order(mesh: Mesh, faces: Integers) -> Integers:
     """Faces of a surface that meets itself: of two that face each other the first has the pressure,
     and so its neighbours should have it.
@@ -222,10 +289,13 @@ def _block(
     elements: tuple[str, Integers],
     names: tuple[str, ...],
     axisymmetric: float,
+    rule: Rule | None,
 ) -> Block:
     family = "mortar" if mesh.dimension == 2 else "touch"
     kernel = load_kernel(f"{family}_side_{len(CELLS[elements[0]].nodes)}")
     side_data = {"rho": 1.0, "ring": axisymmetric} if mesh.dimension == 2 else {"rho": 1.0}
     study_names = {f"u_{axis}": name for axis, name in zip("xyz", names, strict=False)}
     study_names |= {m: f"{name}:{m}" for m in MULTIPLIERS[mesh.dimension]}
-    return page_on(mesh, label, kernel, elements, PageOptions(called=study_names), side_data)
+    return page_on(
+        mesh, label, kernel, elements, PageOptions(called=study_names, rule=rule), side_data
+    )

@@ -20,6 +20,7 @@ from softehl.runtime.definition.problem_definition import (
     Where,
     display_name,
 )
+from softehl.runtime.definition.rigid_bodies import component_of
 from softehl.runtime.mesh.face_matching import match_faces
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.suggestions import did_you_mean, join_names
@@ -70,6 +71,12 @@ def _set_at_nodes(
     definition: ProblemDefinition, where: Where | None, name: str, value: Any
 ) -> None:
     mesh = definition.mesh
+    if isinstance(where, str) and where in definition.rigids:
+        body = definition.rigids[where]
+        number = read.datum("initial", name, value, body.point[None])
+        unknown = component_of(body, f"initial({where!r})", name)
+        definition.start.append(InitialValues(unknown, np.array([body.node]), number))
+        return
     nodes = np.arange(len(mesh.points)) if where is None else read.nodes_of(mesh, where)
     at_nodes = read.datum("initial", name, value, mesh.points[nodes])
     definition.start.append(InitialValues(name, nodes, at_nodes))

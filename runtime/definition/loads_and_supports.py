@@ -12,11 +12,22 @@ from softehl.runtime.definition.problem_definition import (
     Load,
     PrescribedValues,
     ProblemDefinition,
+    RigidBody,
     StudyError,
     Where,
     display_name,
 )
-from softehl.runtime.discretisation.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
+from softehl.runtime.definition.rigid_bodies import resolved
+from softehl.runtime.discretisation.loads import (
+    Amount,
+    DeadLoad,
+    NodalForce,
+    Pressure,
+    RigidMoment,
+    Spring,
+    Tie,
+)
+from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Predicate
 
@@ -26,6 +37,10 @@ def add_load(definition: ProblemDefinition, where: Where, components: Mapping[st
     mesh = definition.mesh
     context = f"load({display_name(where)})"
     read.require_unknowns(context, components, "u_x=1")
+    rigid = resolved(definition, where, context, components)
+    if rigid is not None:
+        _load_body(definition, *rigid)
+        return
     for name, component in components.items():
         value = read.amount(context, name, component)
         if isinstance(where, str) or callable(where):
@@ -35,6 +50,21 @@ def add_load(definition: ProblemDefinition, where: Where, components: Mapping[st
         else:
             nodes = mesh.own(read.nodes_of(mesh, where))
             _add_force(definition, "load", where, NodalForce(value), nodes[:, None], (name,))
+
+
+def _load_body(
+    definition: ProblemDefinition, body: RigidBody, amounts: Mapping[str, Amount]
+) -> None:
+    """Forces and moments at the reference point of a rigid body."""
+    node = np.array([[body.node]])
+    turning = [body.unknown(c) for c in body.components if c.startswith("theta_")]
+    for name, value in amounts.items():
+        if name in turning and body.finite:
+            law = load_kernel("rigid_moment")
+            kernel: NodalForce = RigidMoment(value, axis=turning.index(name), law=law)
+            _add_force(definition, "load", body.name, kernel, node, (*turning,))
+        else:
+            _add_force(definition, "load", body.name, NodalForce(value), node, (name,))
 
 
 def add_pressure(
@@ -60,7 +90,15 @@ def add_springs(
 ) -> None:
     """Add springs to the ground; see `Study.spring`."""
     mesh = definition.mesh
-    read.require_unknowns(f"spring({display_name(where)})", stiffness, "u_x=2")
+    context = f"spring({display_name(where)})"
+    read.require_unknowns(context, stiffness, "u_x=2")
+    rigid = resolved(definition, where, context, stiffness)
+    if rigid is not None:
+        body, springs = rigid
+        for name, value in springs.items():
+            kernel = Spring(read.finite(name, value))
+            _add_force(definition, "spring", where, kernel, np.array([[body.node]]), (name,))
+        return
     for name, value in stiffness.items():
         kernel = Spring(read.finite(name, value))
         nodes = mesh.own(read.nodes_of(mesh, where))
@@ -74,6 +112,13 @@ def add_conditions(
     mesh = definition.mesh
     context = f"fix({display_name(where)})"
     read.require_unknowns(context, values, "u_x=0")
+    rigid = resolved(definition, where, context, values)
+    if rigid is not None:
+        body, amounts = rigid
+        for name, amount in amounts.items():
+            condition = PrescribedValues(where, np.array([body.node]), name, amount)
+            definition.conditions.append(condition)
+        return
     for name, prescribed in values.items():
         value = read.amount(context, name, prescribed)
         condition = PrescribedValues(where, read.nodes_of(mesh, where), name, value)

@@ -132,6 +132,40 @@ class InitialValues:
     values: Array
 
 
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """A rigid body: nodes that move with a reference point, or the reference point alone.
+
+    nodes: (n,). node: that has the unknowns of its motion. point: (dim,) reference point. names: of
+    the displacements of the nodes. finite: of rotations of any size; else of small ones.
+    axisymmetric: it moves along the axis alone.
+    """
+
+    name: str
+    nodes: Integers
+    node: int
+    point: Array
+    names: tuple[str, ...]
+    finite: bool
+    axisymmetric: bool = False
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Components of its motion: the displacement, and the angle or rotation vector."""
+        if len(self.point) == 2:
+            return "u_x", "u_y", "theta"
+        return "u_x", "u_y", "u_z", "theta_x", "theta_y", "theta_z"
+
+    @property
+    def slots(self) -> tuple[Slot, ...]:
+        """Its unknowns, at the first node of an element."""
+        return tuple(Slot(self.unknown(c), 0) for c in self.components)
+
+    def unknown(self, component: str) -> str:
+        """Name of an unknown of the body."""
+        return f"{self.name}:{component}"
+
+
 @dataclass(eq=False)
 class ProblemDefinition:
     """A boundary-value problem that is being written down, in the order of the script.
@@ -148,6 +182,7 @@ class ProblemDefinition:
     start: list[InitialValues] = field(default_factory=list)
     contacts: list[Any] = field(default_factory=list)
     point_values: list[str] = field(default_factory=list)
+    rigids: dict[str, RigidBody] = field(default_factory=dict)
 
     def copy(self) -> ProblemDefinition:
         """A copy, to which more can be added."""
@@ -158,10 +193,9 @@ class ProblemDefinition:
 
     @property
     def size(self) -> int:
-        """Number of blocks, contacts, supports, loads and initial values; it only grows."""
-        counted = (self.blocks, self.contacts, self.conditions, self.forces, self.start)
-        counted = (*counted, self.point_values)
-        return sum(map(len, counted))
+        """Number of blocks, bodies, contacts, supports, loads, initial values; it only grows."""
+        counted = (self.blocks, self.rigids, self.contacts, self.conditions, self.forces)
+        return sum(map(len, (*counted, self.start, self.point_values)))
 
     def prescribed(self, name: str) -> Integers:
         """Nodes at which an unknown is prescribed."""

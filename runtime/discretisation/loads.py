@@ -195,6 +195,33 @@ class NodalForce(_Kernel):
 
 
 @dataclass(frozen=True, eq=False)
+class RigidMoment(NodalForce):
+    """A moment about an axis that does not turn, on rigid bodies in space.
+
+    Its unknowns are the three of the rotation vector. axis: 0 to 2. law: the kernel `rigid_moment`.
+    """
+
+    axis: int = 0
+    law: Any = None
+    name = "moment"
+
+    def residual(self, coordinates: Array, dofs: Array, **kwargs: Any) -> Array:
+        """Minus the virtual work of the moment, (n, 3)."""
+        return self.tangent(coordinates, dofs, **kwargs)[0]
+
+    def tangent(self, coordinates: Array, dofs: Array, **kwargs: Any) -> tuple[Array, Array]:
+        """Residual and its exact tangent, which is not symmetric."""
+        n = len(dofs)
+        moments = np.zeros((n, 3))
+        moments[:, self.axis] = amount(self.value, coordinates, *kwargs["parameters"].tolist())
+        data, parameters = np.ascontiguousarray(moments), np.empty(0)
+        r, K = self.law.tangent(
+            np.empty((n, 0)), np.ascontiguousarray(dofs), data=data, parameters=parameters
+        )
+        return np.asarray(r), np.asarray(K)
+
+
+@dataclass(frozen=True, eq=False)
 class Spring(_Kernel):
     """Springs between nodes and the ground."""
 

@@ -116,6 +116,12 @@ def _condensed(problem: Problem, K: csc_array) -> csc_array:
     return K if mask.all() else csc_array(K.multiply(mask[:, None]).multiply(mask[None]))
 
 
+def is_motion(name: str) -> bool:
+    """True for a component of the motion of a rigid body, "grip:u_x" or "grip:theta_z"."""
+    _, colon, component = name.rpartition(":")
+    return bool(colon) and (component in DISPLACEMENTS or component.partition("_")[0] == "theta")
+
+
 def concave(
     problem: Problem,
     K: csc_array,
@@ -147,7 +153,7 @@ def concave(
     diagonal = np.where(np.abs(diagonal) > _NOTHING * pivots, diagonal, 0.0)
     inner = {name for block in problem.assembler.blocks for name in block.internal}
     named = [(name, layout.part(name)) for name in layout.names if name not in inner]
-    fields = [part for name, part in named if name not in DISPLACEMENTS]
+    fields = [part for name, part in named if name not in DISPLACEMENTS and not is_motion(name)]
     for part in fields:
         entries, all_fixed = diagonal[part], not anywhere(bool(free[part].any()))
         convex = (entries >= 0.0).any() if all_fixed else (entries[free[part]] > 0.0).any()

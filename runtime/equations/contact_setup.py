@@ -7,10 +7,16 @@ from typing import TypeAlias
 
 import numpy as np
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.contact.body_thickness import inner_radii, thickness
 from softehl.runtime.contact.mortar_pair import MortarPairKernel
 from softehl.runtime.contact.pair_law import LawContact, PairLawKernel, corner_areas
+from softehl.runtime.contact.rigid_contact import (
+    ANY_DEPTH,
+    RigidContact,
+    RigidContactKernel,
+    face_rule,
+)
 from softehl.runtime.contact.search import Contact, ContactSide, FaceContact, StateDependentBlocks
 from softehl.runtime.definition.contact_sides import MULTIPLIERS, ContactRequest
 from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
@@ -21,7 +27,7 @@ from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS, Cell, measures
 from softehl.runtime.suggestions import did_you_mean, join_names
 
-AnyContact: TypeAlias = Contact | FaceContact | LawContact
+AnyContact: TypeAlias = Contact | FaceContact | LawContact | RigidContact
 _SOFTER, _SOFTEST = 0.25, 0.1
 """Of the stiffness of the bodies at their sides; of quadratic faces in 3-D, whose gap varies inside
 them. Blocks, discs and dies with and without friction need as many iterations from 0.03 to 0.25;
@@ -56,6 +62,8 @@ def contact_of(
     unknowns = [request.unknown(m) for m in MULTIPLIERS[mesh.dimension]]
     displacements = np.stack([numbering.nodal[n] for n in request.names], axis=1)
     multipliers = np.stack([numbering.nodal[n] for n in unknowns], axis=1)
+    if request.surface is not None:
+        return _rigid_contact(definition, numbering, request, displacements, multipliers, (*sides,))
     if mesh.dimension == 3:
         law = load_kernel("touch")
         pairs = {(a, b): MortarPairKernel(law, CELLS[a], CELLS[b]) for a, b in kinds}
@@ -83,6 +91,44 @@ def contact_of(
         friction=request.friction,
         ring=request.axisymmetric,
         alone=request.alone,
+    )
+
+
+def _rigid_contact(
+    definition: ProblemDefinition,
+    numbering: Numbering,
+    request: ContactRequest,
+    displacements: Integers,
+    multipliers: Integers,
+    sides: tuple[ContactSide, ...],
+) -> RigidContact:
+    """The contact with a rigid surface, whose stiffness is not known yet."""
+    mesh = definition.mesh
+    surface, motion, reference = request.surface, np.empty(0, dtype=np.int64), mesh.points[0] * 0.0
+    assert surface is not None
+    if request.body is not None:
+        body = definition.rigids[request.body]
+        unknowns = [body.unknown(c) for c in body.components]
+        motion = np.array([numbering.nodal[n][body.node] for n in unknowns])
+        reference = body.point
+    law, moves = load_kernel(f"rigid_touch_{mesh.dimension}"), request.body is not None
+    kernels = {
+        s.kind: RigidContactKernel(law, CELLS[s.kind], face_rule(s.kind), moves) for s in sides
+    }
+    return RigidContact(
+        name=request.name,
+        points=mesh.points,
+        displacements=displacements,
+        multipliers=multipliers,
+        sides=sides,
+        surface=surface,
+        law=law,
+        motion=motion,
+        reference=reference,
+        depth=ANY_DEPTH if request.depth is None else request.depth,
+        friction=request.friction,
+        ring=request.axisymmetric,
+        kernels=kernels,
     )
 
 
@@ -284,7 +330,7 @@ def _rho(
             f"{request.name!r}: the bodies have no stiffness at rest; give stiffness=..., about "
             "Young's modulus over the length of a side"
         )
-    curved = isinstance(contact, FaceContact) and CELLS[side.kind].order > 1
+    curved = not isinstance(contact, Contact) and CELLS[side.kind].order > 1
     return np.asarray((_SOFTEST if curved else _SOFTER) * rho)
 
 
@@ -292,7 +338,7 @@ def _per_area(contact: Contact | FaceContact, faces: object, K: Array) -> Array:
     """Entries of the diagonal of K over the area of each node, (points,); zero elsewhere."""
     area = np.zeros(len(contact.points))
     for kind, nodes in faces:  # type: ignore[attr-defined]
-        axisymmetric = isinstance(contact, Contact) and contact.ring
+        axisymmetric = not isinstance(contact, FaceContact) and contact.ring
         at, weights = CELLS[kind].measured_rule(CELLS[kind].order, ring=axisymmetric)
         points = contact.points[nodes]
         density = measures(CELLS[kind], points, at)

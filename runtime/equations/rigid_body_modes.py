@@ -195,7 +195,7 @@ class _RigidBodyModes:
     def _vector(self) -> list[int] | None:
         """Numbers of the names that are components of one vector, along all coordinates."""
         unknowns, axes = list(self.system.numbering.nodal), _AXES[: self.system.mesh.dimension]
-        for stem in {name.rpartition("_")[0] for name in unknowns}:
+        for stem in dict.fromkeys(name.rpartition("_")[0] for name in unknowns):
             components = [f"{stem}_{axis}" for axis in axes]
             if stem and len(axes) > 1 and all(name in unknowns for name in components):
                 return [unknowns.index(name) for name in components]

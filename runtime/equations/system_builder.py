@@ -15,10 +15,16 @@ from softehl.runtime.definition.problem_definition import (
     Block,
     Load,
     ProblemDefinition,
+    RigidBody,
     StudyError,
 )
+from softehl.runtime.definition.rigid_bodies import linked_nodes, shared_constraints
 from softehl.runtime.discretisation.assembly import Assembler
-from softehl.runtime.discretisation.constraints import require_independent_ties
+from softehl.runtime.discretisation.constraints import (
+    require_independent_ties,
+    tie_dofs,
+    tied_groups,
+)
 from softehl.runtime.discretisation.dofmap import ElementUnknowns, Numbering
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.loads import Spring, Tie
@@ -26,7 +32,7 @@ from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.equations.contact_setup import contact_of, with_contacts
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.face_matching import match_faces
-from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.suggestions import did_you_mean, join_names
 
 
@@ -44,6 +50,9 @@ def build_system(
     elements = [
         ElementUnknowns(b.name, b.nodes, b.slots, b.shared, b.options.dof_tables) for b in pages
     ]
+    for body in _moving_bodies(definition):
+        motion = np.array([[body.node]])
+        elements.append(ElementUnknowns(f"motion of {body.name}", motion, body.slots))
     try:
         numbering = Numbering.of(len(mesh.points), elements, fields)
     except ValueError as error:
@@ -63,6 +72,7 @@ def build_system(
     blocks += [block for contact in contacts.values() for block in contact.empty()]
     assembler = Assembler.build(layout.total, blocks)
     _require_independent_ties(definition, numbering, assembler)
+    _require_independent_links(definition, numbering, assembler)
     system = System(
         mesh,
         writer.numbering,
@@ -86,11 +96,12 @@ def _warn_of_holes(definition: ProblemDefinition) -> None:
         if any(part is nodes or np.array_equal(part, nodes) for part in block_nodes):
             continue
         with_elements = np.concatenate([nodes[:0], *block_nodes])
-        bare[kind] = (
+        missing = (
             match_faces(nodes, with_elements, nodes.shape[1]) < 0
             if len(with_elements)
             else nodes[:, 0] >= 0
         )
+        bare[kind] = missing & ~np.isin(nodes, linked_nodes(definition)).all(axis=1)
     count, total = sum(map(np.sum, bare.values())), sum(map(len, mesh.cells.values()))
     if not 0 < count < total:  # pages on sides or nodes alone leave no hole
         return
@@ -137,6 +148,55 @@ def _require_independent_ties(
         require_independent_ties(assembler, prescribed)
     except ProblemError as error:
         raise StudyError(str(error)) from None
+
+
+def _moving_bodies(definition: ProblemDefinition) -> list[RigidBody]:
+    """Rigid bodies.  Raises StudyError for one that moves nothing."""
+    surfaces = {contact.body for contact in definition.contacts}
+    for body in definition.rigids.values():
+        if not len(body.nodes) and body.name not in surfaces:
+            raise StudyError(
+                f"the rigid body {body.name!r} has no side and no surface: name a side, "
+                f"study.rigid(side, name={body.name!r}), or study.contact(side, surface, "
+                f"body={body.name!r})"
+            )
+    return [*definition.rigids.values()]
+
+
+def _require_independent_links(
+    definition: ProblemDefinition, numbering: Numbering, assembler: Assembler
+) -> None:
+    """Raise StudyError where nodes of rigid bodies are also prescribed, or tied to each other."""
+    if not definition.rigids:
+        return
+    twice = shared_constraints(definition)
+    if twice:
+        raise StudyError(twice)
+    owner = np.full(assembler.size, "", dtype=object)
+    for body in definition.rigids.values():
+        for name in body.names:
+            owner[numbering.nodal[name][body.nodes]] = body.name
+    for condition in definition.conditions:
+        dofs = numbering.nodal[condition.name][condition.nodes]
+        for dof, node in zip(dofs.tolist(), condition.nodes.tolist(), strict=True):
+            if dof >= 0 and owner[dof]:
+                raise StudyError(
+                    f"{condition.call}: node {node} {place_text(definition.mesh.points[node])} "
+                    f"moves with the rigid body {owner[dof]!r}: prescribe the motion of the body, "
+                    f"fix({owner[dof]!r}, ...), and leave the node out here"
+                )
+    held: Flags = owner != ""
+    for condition in definition.conditions:
+        dofs = numbering.nodal[condition.name][condition.nodes]
+        held[dofs[dofs >= 0]] = True
+    a, b, _ = tie_dofs(assembler).T
+    group = tied_groups(a, b, assembler.size)
+    count = np.bincount(group[held], minlength=assembler.size)
+    for dof in np.flatnonzero((count[group] > 1) & (owner != "")):
+        raise StudyError(
+            f"a tie joins a node of the rigid body {owner[dof]!r} with one that is prescribed or "
+            "rigid, too: leave the node out of the tie"
+        )
 
 
 def _require(

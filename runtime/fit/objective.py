@@ -184,7 +184,7 @@ def objective(
     what: str | UserFunction,
     *,
     by: By,
-    at: tuple[float, ...] | None = None,
+    at: tuple[float, ...] | str | None = None,
     reaction: str | None = None,
     arguments: Mapping[str, Any],
 ) -> Objective:

@@ -63,6 +63,8 @@ class Petsc:
         system = system.everywhere
         if system.contacts:
             raise StudyError('contact: its pairs are sought in one process, engine="serial"')
+        if system.definition is not None and system.definition.rigids:
+            raise StudyError('rigid: a body is solved for in one process, engine="serial"')
         if system.mesh.piece is not None:
             if self.matrix_free:
                 system.mesh.require_whole('linear = "matrix-free"')

@@ -15,9 +15,10 @@ from softehl.log import warn
 from softehl.runtime.arrays import Array, Integers, read_only
 from softehl.runtime.contact.pair_law import PairLawKernel, fields_of_law
 from softehl.runtime.definition.argument_checks import writable
-from softehl.runtime.definition.problem_definition import Block, StudyError
+from softehl.runtime.definition.problem_definition import Block, RigidBody, StudyError
 from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.rotations import spin_by_rotation
 from softehl.runtime.equations.eigenproblems import natural_modes
 from softehl.runtime.equations.interpolation import (
     at_every_node,
@@ -201,14 +202,14 @@ class Result:
         return self.system.comm.gather_nodes(self.values(name))
 
     def at(
-        self, place: tuple[float, ...], *, cells: str | None = None, block: str | None = None
+        self, place: tuple[float, ...] | str, *, cells: str | None = None, block: str | None = None
     ) -> dict[str, float]:
-        """Return the unknowns, or fields of a block, at a place or at places.
+        """Return the unknowns, or fields of a block, at a place, or the motion of a rigid body.
 
         Parameters
         ----------
-        place : tuple of float or array
-            Reference coordinates (dim,) [mm].
+        place : tuple of float, array or str
+            Reference coordinates (dim,) [mm], or the name of a rigid body.
         cells : str, optional
             Group that contains the cell, where bodies meet that share no nodes.
         block : str, optional
@@ -225,6 +226,8 @@ class Result:
         MeshError
             The place lies outside the mesh or group.
         """
+        if isinstance(place, str):
+            return dict(zip(*self._motion_of(place, self.x), strict=True))
         (row,) = self._at_points(np.asarray(place, dtype=np.float64)[None], cells, block)
         return row
 
@@ -528,7 +531,8 @@ class Result:
         Parameters
         ----------
         where : str or callable
-            Side, group, or predicate of coordinates.
+            Side, group, or predicate of coordinates; or the name of a rigid body, for the force and
+            the moment that hold it, about axes that do not turn.
 
         Returns
         -------
@@ -540,12 +544,34 @@ class Result:
         MeshError
             There is no such side.
         """
+        if isinstance(where, str) and where in self._rigids:
+            components, forces = self._motion_of(where, self._forces)
+            if len(components) == 6 and self._rigids[where].finite:
+                theta = np.array(self._motion_of(where, self.x)[1][3:])
+                moment = np.linalg.lstsq(spin_by_rotation(theta).T, np.array(forces[3:]))[0]
+                forces = [*forces[:3], *moment.tolist()]
+            return dict(zip(components, forces, strict=True))
         nodes = self.system.mesh.nodes(where)
         sums = {}
         for name, numbers in self._global_system.numbering.nodal.items():
             dofs = numbers[nodes]
             sums[name] = self.system.comm.sum_at(self._forces, dofs[dofs >= 0])
         return sums
+
+    @property
+    def _rigids(self) -> Mapping[str, RigidBody]:
+        definition = self._global_system.definition
+        return {} if definition is None else definition.rigids
+
+    def _motion_of(self, name: str, values: Array) -> tuple[tuple[str, ...], list[float]]:
+        """Components of the motion of a rigid body and its entries of values (n,)."""
+        if name not in self._rigids:
+            raise UnknownNameError(
+                f"no rigid body {name!r}; there are {join_names(self._rigids) or 'none'}"
+            )
+        body, nodal = self._rigids[name], self._global_system.numbering.nodal
+        numbers = [nodal[body.unknown(c)][body.node] for c in body.components]
+        return body.components, [float(values[number]) for number in numbers]
 
     @cached_property
     def unstable(self) -> int | None:
@@ -587,7 +613,7 @@ class Result:
         what: str | UserFunction,
         *,
         by: By,
-        at: tuple[float, ...] | None = None,
+        at: tuple[float, ...] | str | None = None,
         reaction: str | None = None,
     ) -> dict[Key, float | Array]:
         """Return the derivatives of a quantity with respect to inputs.
@@ -601,10 +627,10 @@ class Result:
             The inputs: block -> parameters and data; "load:right" -> unknowns; "pressure:right" ->
             ["pressure"]; "spring:foot", "tie:left" and "fix:left" -> unknowns; "nodes" or
             "nodes:SIDE" -> axes, or modes {name: (points, dim)}.
-        at : tuple of float, optional
-            Reference coordinates (dim,).
+        at : tuple of float or str, optional
+            Reference coordinates (dim,), or the name of a rigid body.
         reaction : str, optional
-            Name of a side.
+            Name of a side or of a rigid body.
 
         Returns
         -------
@@ -631,7 +657,7 @@ class Result:
         what: str | UserFunction,
         *,
         by: By,
-        at: tuple[float, ...] | None = None,
+        at: tuple[float, ...] | str | None = None,
         reaction: str | None = None,
     ) -> dict[tuple[Key, Key], float | Array]:
         """Return the second derivatives of a quantity with respect to inputs.
@@ -677,7 +703,7 @@ class Result:
         *,
         by: By,
         direction: Mapping[Key, float | Array],
-        at: tuple[float, ...] | None = None,
+        at: tuple[float, ...] | str | None = None,
         reaction: str | None = None,
     ) -> dict[Key, float | Array]:
         """Return the second derivatives of a quantity times a direction of the inputs.

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.definition.problem_definition import RigidBody, StudyError
+from softehl.runtime.definition.rigid_bodies import component_of
 from softehl.runtime.equations.interpolation import interpolation_weights
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.mesh import Mesh, MeshError, place_text
@@ -53,7 +54,7 @@ class _Located:
 
 @dataclass(frozen=True)
 class PointValue:
-    """An unknown at a place of the undeformed mesh."""
+    """An unknown at a place of the undeformed mesh, or of the motion of a rigid body."""
 
     name: str
     point: tuple[float, ...]
@@ -84,6 +85,9 @@ class PointValue:
 
     def _located(self, system: System) -> tuple[Integers, Array]:
         """Numbers and weights (k,) of the unknowns that make the value."""
+        for body in _bodies(system).values():
+            if self.name in [body.unknown(c) for c in body.components]:
+                return system.numbering.nodal[self.name][[body.node]], np.ones(1)
         point = np.asarray(self.point, dtype=np.float64)
         by_unknown = interpolation_weights(system, point)
         if by_unknown is None:
@@ -122,6 +126,9 @@ class ReactionSum:
     def weights(self, step: LinearisedStep) -> Array:
         """See `Quantity`."""
         system = step.tape.system
+        bodies = _bodies(system)
+        if self.side in bodies:
+            return _force_on(bodies[self.side], self.name, system)
         _require(self.name, system)
         dofs, found = system.numbering.nodal[self.name], np.zeros(system.size)
         side_dofs = dofs[system.mesh.nodes(self.side)]
@@ -131,6 +138,23 @@ class ReactionSum:
     def curvature(self, step: LinearisedStep, dx: Array) -> Array:
         """See `Quantity`."""
         return np.zeros_like(dx)
+
+
+def _bodies(system: System) -> Mapping[str, RigidBody]:
+    return {} if system.definition is None else system.definition.rigids
+
+
+def _force_on(body: RigidBody, component: str, system: System) -> Array:
+    """Weights (n,) of a component of the reaction of a rigid body."""
+    name = component_of(body, f"reaction={body.name!r}", component)
+    if component.startswith("theta_") and body.finite:
+        raise StudyError(
+            f"reaction={body.name!r}: {component}: a moment in space depends on the rotation, and "
+            'has no derivatives here: forces have, and with rotations="small" moments'
+        )
+    weights = np.zeros(system.size)
+    weights[system.numbering.nodal[name][body.node]] = 1.0
+    return weights
 
 
 @dataclass(frozen=True)
@@ -179,16 +203,18 @@ class UserQuantity:
 
 def quantity(
     what: str | UserFunction,
-    at: tuple[float, ...] | None,
+    at: tuple[float, ...] | str | None,
     reaction: str | None,
 ) -> Quantity:
-    """Return the quantity of a request.  Raises StudyError."""
+    """Return the quantity of a request; at: a place or a rigid body.  Raises StudyError."""
     if callable(what):
         return UserQuantity(what)
     if (at is None) == (reaction is None):
         raise StudyError(
             f"quantity {what!r}: give at=(x, y), a place, or reaction=..., a side: one of them"
         )
+    if isinstance(at, str):
+        return PointValue(f"{at}:{what}", ())
     return ReactionSum(what, reaction) if at is None and reaction is not None else _at(what, at)
 
 

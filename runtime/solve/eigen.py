@@ -92,17 +92,17 @@ class Pivots:
 
 def _weak(K: csc_array, saddle: Flags) -> Array:
     """Numbers (n,) that the diagonal of K has too much where it is zero: multipliers get less, and
-    displacements beside stresses more.
+    displacements beside stresses, and the motion of a rigid body beside its forces, more.
     """
     diagonal, result = np.abs(K.diagonal()), np.zeros(K.shape[0])
-    squares, strong = csc_array(K.multiply(K)), diagonal > 0.0
+    squares, pivots = csc_array(K.multiply(K)), diagonal.copy()
     for mask, sign in ((saddle, 1.0), (~saddle, -1.0)):
-        strong_rows = ~mask & strong
-        stiff = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=strong_rows)
-        pivot = _WEAK * np.asarray(squares @ stiff)
-        small = mask & (diagonal < pivot)
-        result[small] = sign * pivot[small]
-        strong &= ~small  # what is left there is rounding
+        strong = ~mask & (pivots > 0.0)
+        stiff = np.divide(1.0, pivots, out=np.zeros_like(diagonal), where=strong)
+        pivot = np.asarray(squares @ stiff)
+        small = mask & (diagonal < _WEAK * pivot)
+        result[small] = sign * _WEAK * pivot[small]
+        pivots[small] = pivot[small]  # what is on the diagonal there is rounding
     return result
 
 
