@@ -43,6 +43,11 @@ SHIPPED = {
         f"touch_side_{a}": Shipped(a, 3 * a + 4 * (3 if a in (3, 6) else 4), fields=True)
         for a in (3, 4, 6, 8, 9)
     },
+    "rigid_link_2": Shipped(2, 7, energy=True),
+    "rigid_link_3": Shipped(2, 12, energy=True),
+    "rigid_moment": Shipped(1, 3),
+    "rigid_touch_2": Shipped(1, 7),
+    "rigid_touch_3": Shipped(1, 13),
     "film": Shipped(2, 4, fields=True),
     "film_upwind": Shipped(2, 4),
     "film_facet": Shipped(3, 6, fields=True),

@@ -17,13 +17,14 @@ from tests.reference.states import State as Known
 from tests.reference.states import (
     mixed_states,
     mortar_states,
+    rigid_states,
     thinning_states,
     touch_states,
     void_states,
 )
 from tests.shipped import RUBBERS
 
-SIDES = (*mortar_states(), *touch_states())
+SIDES = (*mortar_states(), *touch_states(), *rigid_states())
 MATERIALS = ((3.04, 0.62, 500.0), (0.9, 0.0, 40.0), (1.2, 2.1, 2.0e3))
 
 

@@ -38,6 +38,10 @@ MEETINGS = ("sticking", "slipping", "slipping-back", "frictionless", *EMPTY[1:])
 CHOSEN = {
     **{f"mortar_{a}{b}": MEETINGS for a in (2, 3) for b in (2, 3)},
     "touch": ("sticking", "slipping", "open", "beyond", "frictionless"),
+    "rigid_link_2": ("finite", "small"),
+    "rigid_link_3": ("finite", "small"),
+    "rigid_moment": ("turned", "at rest"),
+    **dict.fromkeys(("rigid_touch_2", "rigid_touch_3"), (*MEETINGS[:5], "beyond", "plane")),
     "contact": ("closed", "open"),
     "contact_corner": (
         *("in the wall", "in the fillet", "in the lip", "before the wall, open"),

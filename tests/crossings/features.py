@@ -286,11 +286,16 @@ def _sliding(study: Study, at: Problem) -> None:
     study.fix("bottom", u_y=0)
 
 
+def _rigid(study: Study, at: Problem) -> None:
+    study.rigid("right", name="grip", rotations="small" if at.properties.small else "finite")
+
+
 CONSTRAINTS: dict[str, Callable[[Study, Problem], None]] = {
     "clamped": _clamped,
     "spring": _spring,
     "tied sides": _tied,
     "sliding side": _sliding,
+    "rigid side": _rigid,
 }
 """What holds the body, beside its left side."""
 

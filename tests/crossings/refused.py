@@ -26,6 +26,11 @@ def _again(at: Problem) -> bool:
     return at.load == "prescribed" and at.constraint == "sliding side"
 
 
+def _rigid(at: Problem) -> bool:
+    """Whether a side is rigid."""
+    return at.constraint == "rigid side"
+
+
 REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     ((), lambda at: at.law == "unit cells" and at.geometry == "axisymmetric", "in plane strain"),
     (("large ring",), lambda at: at.law == "unit cells", "in plane strain"),
@@ -51,12 +56,18 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
         "depends on the steps before it",
     ),
     ((), _again, "prescribed twice"),
+    ((), lambda at: _rigid(at) and at.load == "prescribed", "moves with the rigid body"),
+    ((), lambda at: _rigid(at) and at.solver == "amg", "multigrid needs"),
+    ((), lambda at: _rigid(at) and at.solver == "matrix-free", "no product by sum"),
+    ((), lambda at: _rigid(at) and at.analysis == "explicit", "grip:.* has no mass everywhere"),
+    ((), lambda at: _rigid(at) and at.analysis == "newmark", "is a multiplier, whose error"),
     (("hessian",), lambda at: at.load == "weight", "comes as C without second derivatives"),
     (("hessian",), lambda at: at.law == "learned", "no third derivatives"),
     (("hessian",), lambda at: at.law == "softened", "history of each term"),
     (("hessian",), lambda at: at.law == "split", "a third derivative of m.isotropic"),
+    (("hessian",), _rigid, "comes as C without second derivatives"),
     (
-        ("static state", "equilibrium", "contact"),
+        ("static state", "equilibrium", "contact", "rigid surface"),
         lambda at: at.analysis == "explicit" and _mixed(at),
         "explicit.*(no mass everywhere|belongs to elements)",
     ),
@@ -68,6 +79,6 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     (("tied halves",), lambda at: at.solver == "amg", "multigrid needs"),
     (("tied halves",), lambda at: at.constraint == "tied sides", "tied in a circle"),
     (("law of contact",), _moves, "a contact by law=... has no march with inertia"),
-    (("contact",), lambda at: at.solver == "amg", "multigrid needs"),
+    (("contact", "rigid surface"), lambda at: at.solver == "amg", "multigrid needs"),
 )
 """What a user reads."""

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl import Mesh, Study
+from softehl import Mesh, Plane, Study
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.mesh import Predicate
 from softehl.runtime.mesh.readers.meshio import import_meshio
@@ -372,6 +372,23 @@ def pressed_by_law(at: Problem) -> Pairs:
     return pressed(at, law=cohesion, s=1.0, d=0.1)
 
 
+def on_plane(at: Problem) -> Pairs:
+    """A body on a rigid plane is the one whose side slides; the plane has its force."""
+    study, known = (Study(at.mesh()) for _ in range(2))
+    up, down = np.eye(at.dimension)[-1], at.axes[-1]
+    for one in (study, known):
+        at.properties.add(one)
+        one.fix("left", **dict.fromkeys(at.axes[:-1], 0.0))
+        push = {down: lambda x, t: np.full(len(x), -0.02 * at.ramp(t))}
+        one.load("top", **push)
+    known.fix("bottom", **{down: 0.0})
+    study.contact("bottom", Plane(0.0 * up, up))
+    result, sliding = at.run(study), at.run(known)
+    fields = result.fields("contact")
+    yield float((fields["pressure"] * fields["area"]).sum()), 0.02 * SIZE[0]
+    yield displacements(result), displacements(sliding)
+
+
 def written(at: Problem) -> Pairs:
     """A file has what the result has."""
     meshio = import_meshio()
@@ -483,7 +500,12 @@ RELATIONS: dict[str, Relation] = {
         quick=("load", "constraint"),
         tolerance=1e-4,
         looser={"tri6": 1e-3},  # rules of rings have a higher degree
-        of=lambda at: at.dimension == 2 and at.load != "force" and at.constraint != "spring",
+        # a rigid ring moves along its axis alone
+        of=lambda at: (
+            at.dimension == 2
+            and at.load != "force"
+            and at.constraint not in ("spring", "rigid side")
+        ),
     ),
     "slab": Relation(
         slab,
@@ -565,6 +587,14 @@ RELATIONS: dict[str, Relation] = {
         (("analysis", "law"),),
         quick=("analysis",),
         tolerance=1e-6,
+    ),
+    "rigid surface": Relation(
+        on_plane,
+        ("analysis", "law", "solver"),
+        (("analysis", "law"),),
+        quick=("analysis",),
+        tolerance=1e-6,
+        looser={"midpoint": 1e-2, "newmark": 3e-3, "generalised-alpha": 3e-3, "explicit": 1e-2},
     ),
     "files": Relation(written, ("cell", "law"), quick=(), tolerance=1e-12),
 }

@@ -14,6 +14,7 @@ from tests.reference import (
     film,
     mixed,
     mortar,
+    rigid,
     section,
     sheet,
     solids,
@@ -55,6 +56,7 @@ ENERGIES: dict[str, Callable[[Arguments], Potential]] = {
     "mean_rotation": _of(section.rotation),
     "mean_axial": _of(section.axial),
     "axial_spring": _of(section.spring),
+    **{f"rigid_link_{d}": _of(rigid.link) for d in (2, 3)},
 }
 """Families with a potential, by the arguments of an element: residual and tangent follow."""
 WEAK: dict[str, Callable[[Arguments, Vector], Vector]] = {
@@ -68,6 +70,8 @@ WEAK: dict[str, Callable[[Arguments, Vector], Vector]] = {
     **mixed.RESIDUALS,
     **mortar.RESIDUALS,
     **touch.RESIDUALS,
+    "rigid_moment": rigid.moment,
+    **{f"rigid_touch_{d}": rigid.touch for d in (2, 3)},
 }
 """Residuals of the others."""
 FIELDS: dict[str, Callable[[Arguments, Vector], Matrix]] = {

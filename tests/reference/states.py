@@ -244,6 +244,68 @@ def touch_states() -> Iterator[State]:
         yield State(f"touch_side_{a}", "turned", _tuple(now - u), dofs, (), (10.0,))
 
 
+def rigid_states() -> Iterator[State]:
+    """Links of finite and small rotation, a moment, and points against planes and round surfaces
+    that stick, slip, are open or too deep.
+    """
+    motion = {2: (0.2, -0.1, 0.7), 3: (0.2, -0.1, 0.3, 0.7, -0.4, 0.9)}
+    for d in (2, 3):
+        X, u, force = (0.4, 1.3, -0.6)[:d], (0.3, -0.2, 0.5)[:d], (1.5, -0.7, 0.9)[:d]
+        reference = (0.1, 0.2, -0.3)[:d]
+        for label, finite in (("finite", 1.0), ("small", 0.0)):
+            dofs, data = (*u, *force, *motion[d]), (*reference, finite)
+            yield State(f"rigid_link_{d}", label, (*X, *X), dofs, (), data)
+    yield State("rigid_moment", "turned", (), (0.7, -0.4, 0.9), (), (1.5, -0.7, 0.9))
+    yield State("rigid_moment", "at rest", (), (0.0, 0.0, 0.0), (), (1.5, -0.7, 0.9))
+    for label, gap, came, friction, flat, side in (
+        ("sticking", -0.01, 1e-3, 0.3, 0.0, 1.0),
+        ("slipping", -0.02, 0.05, 0.3, 0.0, 1.0),
+        ("slipping-back", -0.02, -0.05, 0.3, 0.0, 1.0),
+        ("open", 0.3, 0.01, 0.3, 0.0, 1.0),
+        ("beyond", -0.7, 0.01, 0.3, 1.0, 1.0),
+        ("frictionless", -0.02, 0.03, 0.0, 0.0, -1.0),
+        ("plane", -0.02, 0.05, 0.3, 1.0, 1.0),
+    ):
+        for d in (2, 3):
+            yield _touching(d, label, (gap, came), friction, (flat, side), motion[d])
+
+
+def _touching(
+    d: int,
+    label: str,
+    place: tuple[float, float],
+    friction: float,
+    surface: tuple[float, float],
+    motion: tuple[float, ...],
+) -> State:
+    """A point at a gap of a surface of radius 1.3, which came along it."""
+    (gap, came), (flat, side), radius = place, surface, 1.3
+    reference, c = np.array([0.1, 0.2, -0.3])[:d], np.array([0.4, -0.2, 0.1])[:d]
+    normal = np.array([0.6, 0.8, 0.0])[:d]
+    along = np.array([0.8, -0.6, 0.0])[:d]
+    axis = normal if flat else np.zeros(d)
+    if d == 3 and not flat and label in ("sticking", "slipping"):
+        axis = np.array([0.0, 0.0, 1.0])  # a cylinder
+    y = c + gap * normal if flat else c + side * (radius * side + gap) * normal
+    turn = _rotation(motion[d:])
+    x = turn @ (y - reference) + reference + np.array(motion[:d])
+    multipliers = (0.4, 0.02) if d == 2 else (0.4, 0.02, -0.03, 0.01)
+    data = (10.0, friction, 0.5, *reference, *(y - came * along), 0.7, flat, side, radius)
+    dofs = (*_tuple(x), *multipliers, *motion)
+    return State(f"rigid_touch_{d}", label, (), dofs, (), (*map(float, (*data, *c, *axis)),))
+
+
+def _rotation(theta: tuple[float, ...]) -> np.ndarray:
+    """Rotation by an angle or a vector (Rodrigues)."""
+    if len(theta) == 1:
+        c, s = math.cos(theta[0]), math.sin(theta[0])
+        return np.array([[c, -s], [s, c]])
+    x, y, z = theta
+    S, angle = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]), math.hypot(x, y, z)
+    first, second = math.sin(angle) / angle, (1 - math.cos(angle)) / angle**2
+    return np.asarray(np.eye(3) + first * S + second * S @ S)
+
+
 def section_states() -> Iterator[State]:
     """Mean rotation and axial spring on distorted quads."""
     rng = np.random.default_rng(2009)
@@ -402,4 +464,5 @@ def all_states() -> list[State]:
     """Every state of every family."""
     bodies = [*solid_states(), *rubber_states(), *boundary_states(), *section_states()]
     films = [*film_states(), *upwind_states(), *facet_states(), *thinning_states()]
-    return [*bodies, *films, *mixed_states(), *void_states(), *mortar_states(), *touch_states()]
+    sides = [*mortar_states(), *touch_states(), *rigid_states()]
+    return [*bodies, *films, *mixed_states(), *void_states(), *sides]

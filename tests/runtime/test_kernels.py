@@ -29,11 +29,11 @@ from softehl.runtime.kernels.kernel import (
 )
 from softehl.runtime.kernels.shared_library import manifest
 from tests.codegen.workshop import write
-from tests.reference.states import mortar_states, touch_states
+from tests.reference.states import mortar_states, rigid_states, touch_states
 from tests.shipped import SHIPPED, VALUES
 
 FAMILIES = tuple(manifest())
-SIDES = (*mortar_states(), *touch_states())
+SIDES = (*mortar_states(), *touch_states(), *rigid_states())
 MATERIAL = np.array([3.04, 0.62, 500.0])
 Call = Callable[..., Any]
 
