@@ -206,7 +206,7 @@ def _law_contact(
     )
 
 
-def _field(numbering: Numbering, request: ContactRequest, name: str) -> Array:
+def _field(numbering: Numbering, request: ContactRequest, name: str) -> Integers:
     """Numbers of a field of a law at each node.  Raises StudyError where no page has it."""
     if name not in numbering.nodal:
         raise StudyError(
@@ -216,7 +216,7 @@ def _field(numbering: Numbering, request: ContactRequest, name: str) -> Array:
     return numbering.nodal[name]
 
 
-def _count(request: ContactRequest, name: str, dofs: Array, faces: tuple[str, Array]) -> int:
+def _count(request: ContactRequest, name: str, dofs: Integers, faces: tuple[str, Integers]) -> int:
     """Number of nodes of a face with a field: all, or the corners.  Raises StudyError."""
     kind, nodes = faces
     defined = (dofs[nodes] >= 0).all(axis=0)
@@ -258,7 +258,8 @@ def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
     problem = system.problem(step)
     with np.errstate(all="ignore"):
         stiffness = problem.assembler.linearise(x, problem.parameters)[1].diagonal()
-    assembler, blocks, contacts_with_stiffness = system.assembler, dict(system.blocks), []
+    assembler, blocks = system.assembler, dict(system.blocks)
+    contacts_with_stiffness: list[AnyContact] = []
     for request in definition.contacts:
         contact = contacts[request.name]
         if isinstance(contact, LawContact):
@@ -309,7 +310,7 @@ def weighted(
 def _rho(
     system: System,
     request: ContactRequest,
-    contact: Contact | FaceContact,
+    contact: Contact | FaceContact | RigidContact,
     side: ContactSide,
     K: Array,
 ) -> Array:
@@ -334,7 +335,7 @@ def _rho(
     return np.asarray((_SOFTEST if curved else _SOFTER) * rho)
 
 
-def _per_area(contact: Contact | FaceContact, faces: object, K: Array) -> Array:
+def _per_area(contact: Contact | FaceContact | RigidContact, faces: object, K: Array) -> Array:
     """Entries of the diagonal of K over the area of each node, (points,); zero elsewhere."""
     area = np.zeros(len(contact.points))
     for kind, nodes in faces:  # type: ignore[attr-defined]
