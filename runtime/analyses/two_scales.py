@@ -267,7 +267,7 @@ class CellGroup:
 
     @cached_property
     def _various(self) -> bool:
-        """Whether the equations depend on the state before the step."""
+        """True if the equations depend on the state before the step."""
         filled = any(block.filled for block in self.cell.system.blocks.values())
         return filled or bool(self.layout.shapes)
 
