@@ -188,7 +188,7 @@ class Ceed:
             return np.array(values).reshape(-1, 3)
 
     def again(self) -> None:
-        """The same product once more."""
+        """Repeat the product of the last vector."""
         self.operator.apply(self.x, self.y)
 
 
