@@ -19,6 +19,7 @@ from softehl.codegen.tools.library import (
     text_of,
 )
 from softehl.runtime.mesh.cells import CELLS
+from tests.library import fracture
 from tests.library.benchmark import Benchmark, Convergence
 from tests.library.every import BENCHMARKS, CONVERGENCE
 from tests.library.laws import TENSION
@@ -118,3 +119,9 @@ def test_elements_without_a_hoop_strain_refuse_rings(element: str) -> None:
     study = Study(mesh, geometry="axisymmetric")
     with pytest.raises(ModelFileError, match="no hoop strain"):
         study.add("b", element=element)
+
+
+@pytest.mark.slow
+def test_the_force_by_griffith_is_that_of_the_elastic_plate() -> None:
+    published = next(b.published for b in fracture.BENCHMARKS if "Griffith" in b.problem)
+    assert fracture.griffith() == pytest.approx(published, rel=1e-5)
