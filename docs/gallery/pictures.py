@@ -562,6 +562,33 @@ def jumps(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
+def two_scales(figure: Figure, space: dict[str, Any]) -> None:
+    left, middle, right = figure.subplots(1, 3, width_ratios=[1.3, 1, 1.1])
+    coarse, limits = space["coarse"], (0.85, 1.15)
+    state = coarse.unit_cell("foam", 0, 0).result
+    for axes, result, block, kind in (
+        (left, coarse, "foam", "quad9"),
+        (middle, state, "walls", "quad4"),
+    ):
+        fields = result.fields(block)
+        if block == "foam":
+            F = [fields[f"F_{ij}"].mean(axis=1) for ij in ("xx", "yy", "xy", "yx")]
+            J = F[0] * F[1] - F[2] * F[3]
+        else:
+            J = fields["J"].mean(axis=1)
+        quads = result.system.mesh.cells[kind][:, :4]
+        places = result.deformed(("u_x", "u_y"))
+        drawn = draw_cells(axes, places, quads, J, cmap="viridis", clim=limits)
+        axes.autoscale_view()
+    figure.colorbar(drawn, ax=middle, label="volume ratio", shrink=0.85)
+    tips = space["tips"]
+    right.plot(list(tips), list(tips.values()), "o-", label="resolved")
+    right.axhline(coarse.at((2, 0.5))["u_y"], color=GREY, ls="--", label="two scales")
+    right.set_xlabel("cells along a unit of length")
+    right.set_ylabel("deflection [mm]")
+    right.legend()
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
@@ -582,6 +609,7 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "enhanced": enhanced,
     "jumps": jumps,
     "laminate": laminate,
+    "two-scales": two_scales,
     "impact": impact,
     "adhesion": adhesion,
 }

@@ -42,6 +42,15 @@ plt.xlabel("displacement [um]")
 plt.ylabel("force [N]")
 plt.legend();
 """,
+    "two-scales": """\
+import matplotlib.pyplot as plt
+
+plt.plot(tips.keys(), tips.values(), "o-", label="all holes resolved")
+plt.axhline(coarse.at((2, 0.5))["u_y"], ls="--", color="0.5", label="two scales")
+plt.xlabel("cells along a unit of length")
+plt.ylabel("deflection [mm]")
+plt.legend();
+""",
 }
 """The last cell of each notebook; what it draws is made of names that the page leaves behind."""
 

@@ -49,7 +49,14 @@ PARTS = {
 }
 """Name -> folder of the models that it shows ("" for docs/models), and the text that runs."""
 LONG = {
-    *("A rubber on any cell", "Cook's membrane", "Two bodies", "A page with products", "report"),
+    *(
+        "A rubber on any cell",
+        "Cook's membrane",
+        "Two bodies",
+        "Two scales",
+        "A page with products",
+        "report",
+    ),
     *("Ogden: principal stretches in three dimensions", "A viscoplastic steel"),
     *("Gent: a rubber that locks", "A beam that swings", "Interior penalty"),
     *("Heat: weak forms and rates", "Unknowns of one element", "A law of your own"),
@@ -57,7 +64,13 @@ LONG = {
     *(name for name in PARTS if "first-seal" in name),
     *(f"gallery/{entry}" for entry in ("contact", "cook", "enhanced", "fbar", "fit", "fracture")),
     *(f"gallery/{entry}" for entry in ("jumps", "stick-slip", "swing", "cahn-hilliard", "column")),
-    *("gallery/finite-plasticity", "gallery/maxwell", "gallery/adhesion", "gallery/impact"),
+    *(
+        "gallery/finite-plasticity",
+        "gallery/maxwell",
+        "gallery/two-scales",
+        "gallery/adhesion",
+        "gallery/impact",
+    ),
 }
 """Those that take 1.5 s and more."""
 
@@ -301,7 +314,7 @@ def test_notebooks_are_those_of_the_pages() -> None:
     space: dict[str, object] = {"__file__": str(DOCS / "notebooks" / "make.py"), "__name__": "make"}
     exec((DOCS / "notebooks" / "make.py").read_text(encoding="utf-8"), space)
     assert {path.stem for path in NOTEBOOKS} == set(space["DRAWN"])  # type: ignore[call-overload]
-    assert len(NOTEBOOKS) == 2
+    assert len(NOTEBOOKS) == 3
     for path in NOTEBOOKS:
         text = space["notebook"](path.stem)  # type: ignore[operator]
         assert path.read_text(encoding="utf-8") == text, "run python docs/notebooks/make.py"

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import softehl
 from softehl import (
     Mesh,
     Newton,
@@ -248,4 +247,3 @@ def test_what_is_no_unit_cell_is_refused() -> None:
     study.fix("left", u_x=0, u_y=0)
     with pytest.raises(StudyError, match="which MatrixFree does not solve"):
         study.solve(options=SolverOptions(linear="matrix-free"))
-    assert softehl.load_kernel("neo_hooke", cell="quad4", materials=True).tasks
