@@ -275,6 +275,22 @@ def hessian(at: Problem) -> Pairs:
     yield np.array(values, dtype=np.float64), known
 
 
+def begun(at: Problem) -> Pairs:
+    """A path goes on from a result, or from initial values of unknowns and history."""
+    study, again = at.study(), at.study()
+    half = study.solve(steps=at.steps, until=0.5, **at.options)
+    for name in half.system.numbering.nodal:
+        values = half.values(name)
+        nodes = np.flatnonzero(~np.isnan(values))
+        given: Any = {name: values[nodes]}
+        again.initial(nodes, **given)
+    for block, state in half.state.items():
+        names = half.system.blocks[block].kernel.point_data
+        columns: Any = {name: state[:, :, k] for k, name in enumerate(names)}
+        again.initial(block=block, **columns)
+    yield again.solve(**at.options).x, study.solve(start=half, **at.options).x
+
+
 def restarted(at: Problem) -> Pairs:
     """A march that is interrupted and restarted is the one that is not."""
     study = at.study()
@@ -529,6 +545,13 @@ RELATIONS: dict[str, Relation] = {
         (("law", "analysis"), ("law", "constraint"), ("analysis", "load")),
         quick=("analysis",),
         tolerance=1e-5,
+    ),
+    "initial values": Relation(
+        begun,
+        ("law", "cell", "constraint", "geometry", "solver"),
+        quick=("law",),
+        tolerance=1e-6,
+        of=lambda at: at.law != "softened",  # its history has a number for each term
     ),
     "restart": Relation(
         restarted,

@@ -55,6 +55,25 @@ def test_a_prestressed_string_has_its_frequencies() -> None:
     assert np.allclose(study.modes(3, mass=MASS).frequencies, exact / 2, rtol=1e-5)
 
 
+@pytest.mark.parametrize("method", ["newmark", "explicit", "generalised-alpha"])
+def test_a_string_that_is_released_swings_with_its_prestress(method: Any) -> None:
+    study = string(5)
+    study.initial(N=8.0, w=lambda x: np.sin(np.pi * x[:, 0] / 2))
+    *_, motion = study.march(dt=0.01, until=0.5, method=method, mass=MASS)
+    omega = np.pi / 2 * np.sqrt(8.0 / 0.5)
+    assert motion.at((1.0,))["w"] == pytest.approx(np.cos(0.5 * omega), abs=2e-3)
+
+
+def test_a_path_by_arc_length_has_the_prestress() -> None:
+    study = string(4)
+    study.initial(N=8.0)
+    study.load((1.0,), w=1.0)
+    end = study.follow(step=0.05, until=lambda r: r.t > 0.1).results[-1]
+    assert end.at((1.0,))["w"] / end.t == pytest.approx(2.0 / 4 / 8, rel=1e-9)
+    stored = end.integral("N / 2 * grad_w_0**2")
+    assert stored == pytest.approx(end.t * end.at((1.0,))["w"] / 2, rel=1e-9)
+
+
 def test_a_prestressed_membrane_has_its_frequencies() -> None:
     study = Study(Mesh.rectangle(2, 1, cells=(12, 6), order=2))
     study.add("string", taut)
