@@ -47,6 +47,8 @@ from softehl.codegen.emit import (
     ufcx,
 )
 from softehl.codegen.emit.code_motion import Schedule, is_straight, schedule, straight_line
+from softehl.codegen.emit.device import kernels as device
+from softehl.codegen.emit.device.kernels import DeviceKernels
 from softehl.codegen.emit.instruction_scheduling import order_instructions, order_plan
 from softehl.codegen.emit.points import (
     cell_constants,
@@ -186,6 +188,16 @@ def _with_action(made: KernelSource) -> KernelSource:
     text = action.text([*simd_printer.wrappers(text), *preamble], coarse)
     shared = {**made.shared, f"{d.name}_action.c": text}
     return replace(made, shared=shared, cached=len(names), coarse=lower.size)
+
+
+def device_kernels(d: Definition) -> DeviceKernels:
+    """Kernels of a page of fields for a device.  Raises TargetError for a page without."""
+    if d.point is None:
+        raise TargetError(f"{d.name} is no page of fields: a device has kernels of such pages only")
+    layout = Layout(d, d.point)
+    device.require(layout)
+    tasks = (Task.RESIDUAL, Task.PRODUCT, Task.TANGENT)
+    return DeviceKernels(layout, {task: _ordered(layout, task) for task in tasks})
 
 
 def form(d: Definition) -> Choice:

@@ -643,6 +643,7 @@ class Study:
         on_step: Callable[[Result], object] | None = None,
         engine: AnyEngine = None,
         linear: Linear = "auto",
+        device: str | None = None,
         write: str | Path | Series | None = None,
         progress: bool | None = None,
         record: bool = False,
@@ -671,6 +672,9 @@ class Study:
             Linear solver. "direct", "superlu" and "pardiso" factorise; "amg" is algebraic multigrid
             (pyamg) for displacements or one scalar; "matrix-free" assembles no matrix; "auto"
             selects by the size of the problem.
+        device : str, optional
+            With linear="matrix-free": "cuda" is a GPU, by CuPy; "emulated" runs its kernels on the
+            processor, for tests.
         write : str or Path, optional
             A .pvd file; each converged step is written as a .vtu beside it.
         progress : bool, optional
@@ -702,6 +706,7 @@ class Study:
                 newton=newton,
                 engine=engine,
                 linear=linear,
+                device=device,
                 write=write,
                 progress=progress,
                 record=record,
@@ -725,6 +730,7 @@ class Study:
         newton: Newton | None = None,
         engine: AnyEngine = None,
         linear: Linear = "auto",
+        device: str | None = None,
         write: str | Path | None = None,
         progress: bool | None = None,
         record: bool = False,
@@ -770,6 +776,8 @@ class Study:
             As in `solve`.
         linear : str
             As in `solve`.
+        device : str, optional
+            As in `solve`.
         write : str or Path, optional
             As in `solve`; with `start` or `restart` the series continues.
         progress : bool, optional
@@ -811,6 +819,7 @@ class Study:
                 newton=newton,
                 engine=engine,
                 linear=linear,
+                device=device,
                 write=write,
                 progress=progress,
                 record=record,

@@ -36,6 +36,7 @@ BUILT_IN = {
     "jax": "softehl.codegen.hosts.jax:JAX",
     "ngsolve": "softehl.codegen.hosts.ngsolve:NGSOLVE",
     "ufcx": "softehl.codegen.hosts.dolfinx:DOLFINX",
+    "cuda": "softehl.codegen.hosts.cuda:CUDA",
 }
 """Hosts of softehl, as in pyproject.toml."""
 

@@ -26,7 +26,7 @@ def evaluate(
     Raises `ModelFileError` where the page is not known to this process.
     """
     explained = explain(
-        _definition(folder, kernel),
+        definition_of(folder, kernel),
         State(
             coordinates=state.coordinates.tolist(),
             dofs=state.dofs.tolist(),
@@ -43,7 +43,8 @@ def evaluate(
 
 
 @cache
-def _definition(folder: Path, kernel: str) -> Definition:
+def definition_of(folder: Path, kernel: str) -> Definition:
+    """The model of a kernel of a library.  Raises `ModelFileError` where it is not known."""
     if folder == SHIPPED:
         from softehl.codegen.models import ALL
 

@@ -32,6 +32,8 @@ class SolverOptions:
         "serial", "petsc" (all processes of mpirun), or an engine with settings.
     linear : str
         Linear solver, as in `Study.solve`.
+    device : str, optional
+        "cuda" or "emulated", with linear="matrix-free".
     write : str or Path, optional
         A .pvd file; each converged step is written as a .vtu beside it.
     progress : bool, optional
@@ -43,6 +45,7 @@ class SolverOptions:
     newton: Newton | None = None
     engine: AnyEngine = None
     linear: Linear = "auto"
+    device: str | None = None
     write: str | Path | Series | None = None
     progress: bool | None = None
     record: bool = False
@@ -67,7 +70,7 @@ class SolverOptions:
 
         Raises StudyError.
         """
-        engine = engine_of(self.engine, self.linear)
+        engine = engine_of(self.engine, self.linear, self.device)
         if not isinstance(engine, Serial):
             _require_no_unit_cells(definition, engine)
         system = engine.spread(build_system(definition))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array
@@ -24,7 +25,7 @@ from softehl.runtime.solve.linear.coarse_grid_solver import coarse_solver
 from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.linear.krylov import conjugate_gradients, minimal_residuals
 from softehl.runtime.solve.linear.linear_solver import Factors, SingularMatrix
-from softehl.runtime.solve.linear.multigrid import MultigridCycle, MultigridLevel
+from softehl.runtime.solve.linear.multigrid import Apply, MultigridCycle, MultigridLevel
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +92,118 @@ class TieForces:
             x[self.forces] = self.normal.solve(self.equations @ left)
 
 
+class Product(Protocol):
+    """The tangent of a block: y += K x for vectors as `ElementNumbering.vector` makes them."""
+
+    def __call__(self, x: Array, y: Array) -> None:
+        """Add the product."""
+        ...
+
+
+class VectorSpace(Protocol):
+    """The vectors of linear solutions, on the host or on a device.
+
+    apply: T' K T v node by node, with ones for constrained unknowns.
+    """
+
+    def apply(self, v: Any) -> Any:
+        """The operator."""
+        ...
+
+    def vector(self, a: Array) -> Any:
+        """A vector of the host in this space."""
+        ...
+
+    def matrix(self, A: csr_array) -> Any:
+        """A matrix of the host in this space."""
+        ...
+
+    def host(self, a: Any) -> Array:
+        """A vector of this space on the host."""
+        ...
+
+    def coarse(self, A: csr_array, nullspace: Array, block: int) -> Apply:
+        """A function that solves A x = b, at least about; see `coarse_solver`."""
+        ...
+
+
+class Backend(Protocol):
+    """Place of products and linear solutions: the host, or a device."""
+
+    def product(
+        self, block: ElementBlock, x: Array, parameters: Array, levels: MultigridLevels
+    ) -> Product:
+        """The tangent of a block at x, (n,)."""
+        ...
+
+    def coarse(
+        self,
+        block: ElementBlock,
+        product: Any,
+        x: Array,
+        levels: MultigridLevels,
+        free: Flags,
+    ) -> tuple[csr_array, Array]:
+        """The matrix of a block at the lower order, and its part of the diagonal of K, (n,)."""
+        ...
+
+    def space(self, operator: MatrixFreeOperator) -> VectorSpace:
+        """The vectors of linear solutions of an operator."""
+        ...
+
+
+class Host:
+    """The processor of this process."""
+
+    def product(
+        self, block: ElementBlock, x: Array, parameters: Array, levels: MultigridLevels
+    ) -> Product:
+        """See `Backend`."""
+        return ElementProduct.of(block, x, parameters, levels.numberings[block.name])
+
+    def coarse(
+        self,
+        block: ElementBlock,
+        product: Any,
+        x: Array,
+        levels: MultigridLevels,
+        free: Flags,
+    ) -> tuple[csr_array, Array]:
+        """See `Backend`."""
+        return coarse_matrix(block, product, x, levels, free)
+
+    def space(self, operator: MatrixFreeOperator) -> VectorSpace:
+        """See `Backend`."""
+        return HostSpace(operator)
+
+
+@dataclass(frozen=True, eq=False)
+class HostSpace:
+    """Vectors of NumPy."""
+
+    operator: MatrixFreeOperator
+
+    def apply(self, v: Array) -> Array:
+        """See `VectorSpace`."""
+        return self.operator.apply(v)
+
+    def vector(self, a: Array) -> Array:
+        """See `VectorSpace`."""
+        return a
+
+    def matrix(self, A: csr_array) -> csr_array:
+        """See `VectorSpace`."""
+        return A
+
+    def host(self, a: Array) -> Array:
+        """See `VectorSpace`."""
+        return a
+
+    def coarse(self, A: csr_array, nullspace: Array, block: int) -> Apply:
+        """See `VectorSpace`."""
+        return coarse_solver(A, nullspace, block)
+
+
 @dataclass(frozen=True, eq=False)
 class MatrixFreeOperator:
     """The tangent at a state: products of pages, a matrix of loads and springs, and multigrid.
@@ -103,13 +216,14 @@ class MatrixFreeOperator:
     problem: Problem
     levels: MultigridLevels
     iteration: KrylovSettings
-    products: tuple[ElementProduct, ...]
+    products: tuple[Product, ...]
     loads_matrix: csr_array
     diagonals: Array
     ties: TieForces
     lower: csr_array
     constrained: Integers
     work: tuple[Array, Array]
+    backend: Backend
 
     @classmethod
     def of(
@@ -119,8 +233,10 @@ class MatrixFreeOperator:
         iteration: KrylovSettings,
         ties: TieForces,
         x: Array,
+        backend: Backend | None = None,
     ) -> MatrixFreeOperator:
-        """At x, (n,)."""
+        """At x, (n,); on the host if no backend is given."""
+        backend = backend or Host()
         products, diagonal, loads_matrix = [], np.zeros(len(x)), csr_array((len(x), len(x)))
         count = levels.steps[0].shape[1]
         lower = csr_array((count, count))
@@ -129,9 +245,10 @@ class MatrixFreeOperator:
             if parameters is None or not len(block.dofs) or isinstance(block.kernel, Tie):
                 continue
             if block.name in levels.numberings:
-                product = ElementProduct.of(block, x, parameters, levels.numberings[block.name])
+                product = backend.product(block, x, parameters, levels)
                 products.append(product)
-                coarse, own = coarse_matrix(block, product, x, levels, ties.constraints.free)
+                free = ties.constraints.free
+                coarse, own = backend.coarse(block, product, x, levels, free)
                 lower, diagonal = lower + coarse, diagonal + own
             else:
                 tangents = block.tangent(x, parameters)[1]
@@ -157,6 +274,7 @@ class MatrixFreeOperator:
             lower=csr_array(T.T @ lower @ T),
             constrained=constrained,
             work=work,
+            backend=backend,
         )
 
     def times(self, v: Array) -> Array:
@@ -232,26 +350,34 @@ class MatrixFreeOperator:
 
     def _iterated(self, b: Array) -> Array:
         """z of T' K T z = b, node by node; zero for constrained unknowns."""
-        settings, cycle = self.iteration, self._multigrid()
-        method = conjugate_gradients if self.is_symmetric() else minimal_residuals
-        result = method(self.apply, cycle, b, settings.tolerance, settings.max_iterations)
+        settings, space = self.iteration, self.backend.space(self)
+        cycle, limits = self._multigrid(space), (settings.tolerance, settings.max_iterations)
+        if self._is_symmetric(space):
+            result = conjugate_gradients(space.apply, cycle, space.vector(b), *limits)
+        else:  # by SciPy, with vectors of the host
+            apply, precondition = (_on_host(space, action) for action in (space.apply, cycle))
+            result = minimal_residuals(apply, precondition, b, *limits)
         settings.counts.append(result.iterations)
         # up to a negative curvature it is a direction of descent, which Newton's method may take
-        if not (result.converged or result.negative) or not np.isfinite(result.x).all():
+        x = space.host(result.x)
+        if not (result.converged or result.negative) or not np.isfinite(x).all():
             raise SingularMatrix(
                 f"matrix-free: no linear solution after {result.iterations} iterations: leave "
                 "linear out, or take more steps"
             )
-        return result.x
+        return x
 
     def is_symmetric(self) -> bool:
         """True if two random vectors say so."""
+        return self._is_symmetric(self.backend.space(self))
+
+    def _is_symmetric(self, space: VectorSpace) -> bool:
         u, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, len(self.diagonals)))
-        Ku, Kv = self.apply(u), self.apply(v)
+        Ku, Kv = (space.host(space.apply(space.vector(a))) for a in (u, v))
         size = np.linalg.norm(u) * np.linalg.norm(Kv)
         return bool(abs(u @ Kv - v @ Ku) <= 1e-10 * size)
 
-    def _multigrid(self) -> MultigridCycle:
+    def _multigrid(self, space: VectorSpace) -> MultigridCycle:
         levels, level_constraints = self.levels, self.ties.levels
         diagonal = self.diagonals[levels.unknowns[0]]
         if not np.isfinite(diagonal).all():
@@ -262,15 +388,34 @@ class MatrixFreeOperator:
         for step, (upper, lower) in zip(levels.steps, pairwise(level_constraints), strict=True):
             P = without(step, upper.moving) @ lower.square
             if not multigrid_levels:
-                multigrid_levels.append(MultigridLevel.of(self.apply, diagonal, P))
+                multigrid_levels.append(level_in(space, space.apply, diagonal, P))
                 continue
             A = _with_ones(matrix, upper.moving)
-            multigrid_levels.append(MultigridLevel.of(A.__matmul__, A.diagonal(), P))
+            multigrid_levels.append(level_in(space, space.matrix(A).__matmul__, A.diagonal(), P))
             matrix = csr_array(P.T @ matrix @ P)
         moving = level_constraints[-1].moving
         masked_nullspace = np.where(moving[:, None], levels.nullspace, 0.0)
-        lowest = coarse_solver(_with_ones(matrix, moving), masked_nullspace, levels.components)
+        lowest = space.coarse(_with_ones(matrix, moving), masked_nullspace, levels.components)
         return MultigridCycle(multigrid_levels, lowest)
+
+
+def _on_host(space: VectorSpace, action: Apply) -> Apply:
+    """A function of vectors of a space for those of the host."""
+    return lambda v: space.host(action(space.vector(v)))
+
+
+def level_in(
+    space: VectorSpace, apply: Apply, diagonal: Array, interpolation: csr_array
+) -> MultigridLevel:
+    """A level of multigrid in a space."""
+    start = np.random.default_rng(0).uniform(-1.0, 1.0, len(diagonal))
+    return MultigridLevel.of(
+        apply,
+        space.vector(diagonal),
+        space.matrix(interpolation),
+        space.matrix(csr_array(interpolation.T)),
+        space.vector(start),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,13 +80,15 @@ class Serial:
         return Newton(linear=FactorisationCache(solver))
 
 
-def engine_of(engine: AnyEngine, linear: Linear = "auto") -> Engine:
+def engine_of(engine: AnyEngine, linear: Linear = "auto", device: str | None = None) -> Engine:
     """The engine of that name, or of a linear solver that is an engine by itself.
 
     Raises StudyError for an unknown one, MissingPetsc.
     """
     if linear == "matrix-free":
-        return _matrix_free(engine)
+        return _matrix_free(engine, device)
+    if device is not None:
+        raise StudyError(f'device = {device!r}: a device needs linear = "matrix-free"')
     if engine is None or engine == "serial":
         return Serial(linear)
     if linear != "auto":
@@ -100,8 +102,10 @@ def engine_of(engine: AnyEngine, linear: Linear = "auto") -> Engine:
     return engine
 
 
-def _matrix_free(engine: AnyEngine) -> Engine:
+def _matrix_free(engine: AnyEngine, device: str | None) -> Engine:
     """Without matrices, alone or by PETSc.  Raises StudyError, MissingPetsc."""
+    if engine == "petsc" and device is not None:
+        raise StudyError(f'device = {device!r}: leave engine = "petsc" out')
     if engine == "petsc":
         from softehl.runtime.parallel.petsc import Petsc
 
@@ -110,7 +114,7 @@ def _matrix_free(engine: AnyEngine) -> Engine:
         raise StudyError('linear = "matrix-free": engine = "petsc" is allowed, or leave engine out')
     from softehl.runtime.parallel.matrix_free import MatrixFree
 
-    return MatrixFree()
+    return MatrixFree(device=device)
 
 
 def note_of(engine: Engine) -> Callable[[], str]:

@@ -13,10 +13,13 @@ from typing import Any
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.device.device_module import DEVICES
 from softehl.runtime.discretisation.assembly import Assembler
 from softehl.runtime.discretisation.communicator import Communicator
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.matrix_free_operator import (
+    Backend,
+    Host,
     KrylovSettings,
     MatrixFreeOperator,
     TieForces,
@@ -31,6 +34,7 @@ from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.solve.newton import Newton
+from softehl.runtime.suggestions import join_names
 
 _WHO = 'linear = "matrix-free"'
 NO_INERTIA = f"{_WHO}: inertia has no such products; leave linear out"
@@ -55,6 +59,9 @@ class MatrixFree:
         Threads of the products; $OMP_NUM_THREADS, or all processors, if left out.
     iterations : list of int
         Iterations of every solution so far.
+    device : str, optional
+        "cuda": products and linear solutions on a GPU, by CuPy. "emulated": the same kernels,
+        compiled for the processor, for tests. Left out: the processor, by kernels in C.
 
     Raises
     ------
@@ -66,9 +73,15 @@ class MatrixFree:
     most: int = 1000
     threads: int | None = None
     iterations: list[int] = field(default_factory=list)
+    device: str | None = None
 
     def __post_init__(self) -> None:
         """Raises StudyError for settings that no solution can meet."""
+        if self.device not in (None, *DEVICES):
+            raise StudyError(
+                f"device = {self.device!r}: allowed are {join_names(map(repr, DEVICES))}, or leave "
+                "it out"
+            )
         if not (0 < self.tolerance < 1 and self.most >= 1 and (self.threads or 1) >= 1):
             raise StudyError(
                 f"MatrixFree(tolerance={self.tolerance!r}, most={self.most!r}, threads="
@@ -81,7 +94,18 @@ class MatrixFree:
         pages, order = require_products(system)
         levels = levels_of(system, pages, order, self.threads or threads())
         iteration = KrylovSettings(self.tolerance, self.most, self.iterations)
-        return replace(system, comm=_MatrixFreeCommunicator(levels, iteration))
+        backend = Host() if self.device is None else self._on_device(system)
+        return replace(system, comm=_MatrixFreeCommunicator(levels, iteration, backend))
+
+    def _on_device(self, system: System) -> Backend:
+        """The device, with the kernels of all pages.  Raises StudyError."""
+        from softehl.runtime.device.device_operator import Device
+
+        assert self.device is not None
+        device = Device(self.device)
+        for name in system.blocks:
+            device.require(system.assembler.block(name))
+        return device
 
     def newton(self, system: System, requested: Newton | None) -> Newton:
         """See `Engine`."""
@@ -127,8 +151,10 @@ def levels_of(
 class _MatrixFreeCommunicator(Communicator):
     """Communicator of one process, without matrices."""
 
-    def __init__(self, levels: MultigridLevels, iteration: KrylovSettings) -> None:
-        self.levels, self.iteration = levels, iteration
+    def __init__(
+        self, levels: MultigridLevels, iteration: KrylovSettings, backend: Backend
+    ) -> None:
+        self.levels, self.iteration, self.backend = levels, iteration, backend
 
     def local_problem(self, distributed: MatrixFreeProblem) -> Problem:
         """See `Communicator`."""
@@ -140,7 +166,7 @@ class _MatrixFreeCommunicator(Communicator):
 
     def distribute(self, problem: Problem) -> MatrixFreeProblem:
         """See `Communicator`."""
-        return MatrixFreeProblem(problem, self.levels, self.iteration)
+        return MatrixFreeProblem(problem, self.levels, self.iteration, self.backend)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +176,7 @@ class MatrixFreeProblem:
     problem: Problem
     levels: MultigridLevels
     iteration: KrylovSettings
+    backend: Backend
 
     @property
     def equations(self) -> Problem:
@@ -187,7 +214,9 @@ class MatrixFreeProblem:
         """See `Problem`."""
         problem = self.problem
         r = problem.assembler.residual(x, problem.parameters)
-        tangent = MatrixFreeOperator.of(problem, self.levels, self.iteration, self.ties, x)
+        tangent = MatrixFreeOperator.of(
+            problem, self.levels, self.iteration, self.ties, x, self.backend
+        )
         constraints = problem.constraints
         return constraints.residual(r, constraints.deviation(x), tangent.times), tangent
 

@@ -75,6 +75,7 @@ if TYPE_CHECKING:
         SurfaceError,
     )
     from softehl.runtime.definition.problem_definition import StudyError
+    from softehl.runtime.device.device_module import DeviceError
     from softehl.runtime.discretisation.assembly import Assembler
     from softehl.runtime.discretisation.dofmap import DofLayout
     from softehl.runtime.discretisation.element_blocks import ElementBlock
@@ -175,6 +176,7 @@ _PUBLIC = {
     "Outcome": "softehl.cases.harness.observer",
     "Parameters": "softehl.cases.harness.parameters",
     "Petsc": "softehl.runtime.parallel.petsc",
+    "DeviceError": "softehl.runtime.device.device_module",
     "PictureError": "softehl.runtime.mesh.plotting",
     "Plane": "softehl.runtime.contact.rigid_surfaces",
     "Point": "softehl.runtime.solve.solution",
@@ -258,6 +260,7 @@ __all__ = [
     "Curve",
     "Cylinder",
     "Definition",
+    "DeviceError",
     "DifferentiationError",
     "DofLayout",
     "Element",
@@ -518,3 +521,21 @@ def _evaluate_page(
 
 
 page_evaluator.evaluate_page = _evaluate_page
+
+from softehl.runtime.device import device_source  # noqa: E402
+
+
+def _device_source(folder: Path, kernel: str, real: str) -> device_source.DeviceSource:
+    with with_sympy():
+        from softehl.codegen.tools import device_library
+    return device_library.source_of(folder, kernel, real)
+
+
+def _emulated_library(source: device_source.DeviceSource, fibers: bool) -> Path:
+    with with_sympy():
+        from softehl.codegen.tools import device_library
+    return device_library.emulated_library(source, fibers)
+
+
+device_source.device_source = _device_source
+device_source.emulated_library = _emulated_library

@@ -21,12 +21,14 @@ OPTIONAL = {
     **dict.fromkeys(("panel", "panel_material_ui", "pandas", "tornado"), "app"),
     "pyamg": "amg",
     "pyvista": "plot",
+    **dict.fromkeys(("cupy", "cupyx"), "cuda"),
 }
 DISTRIBUTION = {"PIL": "pillow"}
 BROUGHT = {
     **{"petsc4py": "dolfinx-solver-real", "mpi4py": "dolfinx-solver-real"},
     "slepc4py": "dolfinx-solver-real",
     **{"tornado": "panel", "panel_material_ui": "panel-material-ui"},
+    **dict.fromkeys(("cupy", "cupyx"), "cupy-cuda12x"),
 }
 """Packages that come with another one."""
 
@@ -68,7 +70,7 @@ def test_deriving_needs_one_extra_more() -> None:
 
 def test_there_is_an_extra_for_each_purpose() -> None:
     wanted = {"amg", "benchmarks", "cad", "cluster", "dev", "docs", "fast", "generate", "mpi"}
-    wanted |= {"app", "compiler", "hosts", "plot", "report"}
+    wanted |= {"app", "compiler", "cuda", "hosts", "plot", "report"}
     assert set(PROJECT["optional-dependencies"]) == wanted
 
 

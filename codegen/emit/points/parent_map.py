@@ -16,7 +16,7 @@ def write(f: Frame) -> None:
         sums |= {f"dJ{i}{k}": (f"ts[{D} * n + {i}]", f"D{k}") for i in range(D) for k in range(D)}
         sums |= {f"dX{i}": (f"ts[{D} * n + {i}]", "N") for i in range(D)}
     f.sums(f.layout.geometry.order, sums)
-    _inverse(f)
+    write_inverse(f)
     out.idle(["det", *(f"I{k}{m}" for k in range(D) for m in range(D))])
     if f.design:
         _moved(f)
@@ -25,7 +25,7 @@ def write(f: Frame) -> None:
         out.add(f"const V w = det * {f.layout.tables}_W[q]{ring};")
 
 
-def _inverse(f: Frame) -> None:
+def write_inverse(f: Frame) -> None:
     out = f.out
     if f.D == 1:
         out.add("const V det = J00, I00 = 1.0 / det;")

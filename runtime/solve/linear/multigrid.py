@@ -1,7 +1,8 @@
 """Multigrid as a preconditioner: Chebyshev smoothing on every level, any solver on the coarsest.
 
 Every level but the coarsest knows its operator as a function, its diagonal and the interpolation
-from the next one. A cycle is symmetric, and so fit for conjugate gradients.
+from the next one. A cycle is symmetric, and so fit for conjugate gradients. Vectors are arrays of
+NumPy, or of CuPy, which follows NumPy's functions.
 """
 
 from __future__ import annotations
@@ -27,21 +28,34 @@ _POWERS = 12  # products for an estimate of the largest eigenvalue, which is the
 
 @dataclass(frozen=True, eq=False)
 class MultigridLevel:
-    """An operator with the inverse of its diagonal, (n,), and (n, m) from the next level.
+    """An operator with the inverse of its diagonal, (n,), interpolation (n, m) and restriction.
 
-    top: largest eigenvalue of the operator over its diagonal.
+    top: largest eigenvalue of the operator over its diagonal. Arrays are of NumPy or of CuPy.
     """
 
     apply: Apply
     inverse: Array
     interpolation: csr_array
+    restriction: csr_array
     top: float
 
     @classmethod
-    def of(cls, apply: Apply, diagonal: Array, interpolation: csr_array) -> MultigridLevel:
-        """With an estimate of the largest eigenvalue."""
+    def of(
+        cls,
+        apply: Apply,
+        diagonal: Array,
+        interpolation: csr_array,
+        restriction: csr_array | None = None,
+        start: Array | None = None,
+    ) -> MultigridLevel:
+        """With an estimate of the largest eigenvalue from a random vector `start`."""
+        if restriction is None:
+            restriction = csr_array(interpolation.T)
+        if start is None:
+            start = np.random.default_rng(0).uniform(-1.0, 1.0, len(diagonal))
         safe = np.where(diagonal > 0.0, diagonal, 1.0)
-        return cls(apply, 1.0 / safe, interpolation, 1.1 * largest_eigenvalue(apply, safe))
+        top = 1.1 * largest_eigenvalue(apply, safe, start)
+        return cls(apply, 1.0 / safe, interpolation, restriction, top)
 
     def smooth(self, b: Array, x: Array | None) -> Array:
         """x after a smoothing of A x = b; None: from zero, which spares a product."""
@@ -80,16 +94,15 @@ class MultigridCycle:
             return self.coarsest(b)
         level = self.levels[k]
         x = level.smooth(b, None)
-        r = level.interpolation.T @ (b - level.apply(x))
+        r = level.restriction @ (b - level.apply(x))
         x = x + level.interpolation @ self._cycle(r, k + 1)
         return level.smooth(b, x)
 
 
-def largest_eigenvalue(apply: Apply, diagonal: Array) -> float:
+def largest_eigenvalue(apply: Apply, diagonal: Array, start: Array) -> float:
     """Largest eigenvalue of an operator over its diagonal, estimated by Lanczos' method."""
     root = 1.0 / np.sqrt(diagonal)
-    v = np.random.default_rng(0).uniform(-1.0, 1.0, len(diagonal))
-    v /= np.linalg.norm(v)
+    v = start / float(np.linalg.norm(start))
     previous, beta = np.zeros_like(v), 0.0
     alphas, betas = [], []
     for _ in range(_POWERS):

@@ -1,0 +1,811 @@
+"""Kernels of a page of fields for a device, as CUDA.
+
+A block of threads has `elements` elements. Lines of nodes and points, and the points themselves,
+are spread over its threads; what passes between threads stands in shared memory. The function of a
+point, the matrices along lines and the pulled-back moduli are those of the kernels in C with one
+lane.
+
+    residual(n, parameters, history, index, places, X, u, y)            y += residual
+    geometry(n, places, X, kept)                         inverse Jacobian, volume, positions
+    product(n, parameters, history, index, places, X, u, x, y)          y += K x, all computed
+    product_geometry(n, parameters, history, index, kept, u, x, y)      y += K x by `geometry`
+    moduli(n, parameters, history, index, places, X, u, kept)           moduli of the parent cell
+    product_moduli(n, kept, index, x, y)                                y += K x by `moduli`
+    product_transposed(n, kept, index, x, y)                            y += K' x by `moduli`
+    diagonal(n, kept, index, y)                                         y += diagonal of K
+    assembleP(n, kept, low, rows, slots, values)     B' S B with shape functions of the order P
+
+n: elements. parameters: constants. index (n, nodes): place in u, x and y of the first unknown of a
+node, x running first, then y, then z; the unknowns of a node are neighbours. places: the same for
+its coordinates in X. history, kept: (blocks, numbers, threads with a point), x running first in
+the points of an element. low (n, nodes of order P), rows: start of the row of every unknown in
+`values` of a CSR matrix; slots (n, nodes, nodes): place of the second node among the neighbours of
+the first.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softehl.codegen import abi
+from softehl.codegen.abi import TargetError, Task
+from softehl.codegen.elements.cells import ELEMENTS
+from softehl.codegen.emit import c_runtime, simd_printer, simd_routines
+from softehl.codegen.emit.c_printer import number
+from softehl.codegen.emit.code_motion import Schedule
+from softehl.codegen.emit.device import header
+from softehl.codegen.emit.points import parent_map, point_function, sum_factored_product
+from softehl.codegen.emit.points.btab import Parent, pull_back
+from softehl.codegen.emit.points.c_lines import Lines
+from softehl.codegen.emit.points.loop_nest import Frame
+from softehl.codegen.emit.points.point_function import PointOutputs
+from softehl.codegen.emit.points.point_layout import Layout, Needs
+from softehl.codegen.emit.points.sum_factored_product import Table, lagrange, sweep
+from softehl.codegen.graph.graph import Routine
+from softehl.codegen.language.definition import Quantity, functions_of_user
+
+Part = tuple[PointOutputs, Schedule, tuple[Routine, ...]]
+THREADS = 256
+"""Threads of a block at most, where an element has no more points."""
+SHARED = 48_000
+"""Bytes of shared memory that a block may have without asking the driver."""
+DOUBLE = 8
+
+
+def require(layout: Layout) -> None:
+    """Raise `TargetError` for a page that a device cannot run."""
+    d, name = layout.d, layout.d.name
+    if not sum_factored_product.fits(layout):
+        raise TargetError(
+            f"{name} on {d.cell}: a device needs quadrilaterals or hexahedra, fields of the order "
+            "of the cell, and no values at the centroid"
+        )
+    if d.data or d.arrays or functions_of_user(d):
+        kinds = "data of elements, tables, networks or external functions"
+        raise TargetError(f"{name} has {kinds}, and a device knows parameters and history only")
+
+
+def one_lane(text: str) -> str:
+    """Text of lanes as functions of a device.
+
+    C++ has no array literals: an operand of a routine becomes an array with a name.
+    """
+    text = re.sub(r"^static inline ", "DEVICE ", text, flags=re.MULTILINE)
+    text = re.sub(r"^static (M|V|void|int|double) ", r"DEVICE \1 ", text, flags=re.MULTILINE)
+    operands = re.compile(
+        r"(\w+)\(([\w, ()]*?)\(const V\[\]\)\{(.*?)\}(, \w+, &failed\);)", re.DOTALL
+    )
+    count = 0
+
+    def named(m: re.Match[str]) -> str:
+        nonlocal count
+        count += 1
+        return f"const V operands{count}[] = {{{m[3]}}};\n    {m[1]}({m[2]}operands{count}{m[4]}"
+
+    return operands.sub(named, text).replace("const double", "const V")
+
+
+def single_precision(text: str) -> str:
+    """Floating-point literals with the suffix of single precision."""
+    literal = r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)(?![\w.])"
+    return re.sub(literal, r"\1f", text)
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceKernels:
+    """Kernels of a layout; parts: outputs of its tasks at a point, in the printed order."""
+
+    layout: Layout
+    parts: Mapping[str, Part]
+
+    # sizes --------------------------------------------------------------------------------------
+
+    @property
+    def D(self) -> int:
+        """Dimension."""
+        return self.layout.dimension
+
+    @cached_property
+    def C(self) -> int:
+        """Components."""
+        return len(self.layout.components)
+
+    @cached_property
+    def n(self) -> int:
+        """Nodes along a line."""
+        assert self.layout.geometry.line is not None
+        return len(self.layout.geometry.line.values[0])
+
+    @cached_property
+    def q(self) -> int:
+        """Points along a line."""
+        assert self.layout.geometry.line is not None
+        return len(self.layout.geometry.line.values)
+
+    @property
+    def m(self) -> int:
+        """Entries of a line in an array."""
+        return max(self.n, self.q)
+
+    @property
+    def row(self) -> int:
+        """Length of a line in shared memory, odd: neighbours lie in different banks."""
+        return self.m | 1
+
+    @property
+    def size(self) -> int:
+        """Entries of a component of an element in shared memory."""
+        return int(self.row * self.m ** (self.D - 1))
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of an element."""
+        return int(self.n**self.D)
+
+    @property
+    def points(self) -> int:
+        """Points of an element."""
+        return int(self.q**self.D)
+
+    @cached_property
+    def elements(self) -> int:
+        """Elements of a block: as many as threads and shared memory hold."""
+        of_memory = SHARED // (DOUBLE * (2 + self.D) * max(self.C, self.D) * self.size)
+        return max(1, min(THREADS // self.points, of_memory))
+
+    @property
+    def owners(self) -> int:
+        """Threads that have a point."""
+        return self.elements * self.points
+
+    @property
+    def threads(self) -> int:
+        """Threads of a block."""
+        return -(-self.owners // 32) * 32
+
+    @property
+    def symmetric(self) -> bool:
+        """True if the tangent is symmetric."""
+        return self.parent.symmetric
+
+    @cached_property
+    def parent(self) -> Parent:
+        """Moduli of the parent cell."""
+        return Parent(self.layout, self.parts[Task.TANGENT][0])
+
+    @cached_property
+    def kept(self) -> list[str]:
+        """Variables that `geometry` stores at a point."""
+        D, names = range(self.D), ["w"]
+        if self._positions:
+            names += [f"X{i}" for i in D]
+        return [f"I{k}{m}" for k in D for m in D] + names
+
+    @cached_property
+    def _positions(self) -> bool:
+        """True if a point needs its coordinates."""
+        of_tasks = [Needs.of(outputs.entries)["coordinates"] for outputs, *_ in self.parts.values()]
+        return any(of_tasks) or self.layout.form.axisymmetric
+
+    @cached_property
+    def tables(self) -> dict[str, NDArray[np.float64]]:
+        """Places of points and nodes along a line, values, slopes at points, weights."""
+        rule = self.layout.d.rule
+        at = [float(p[-1]) for p in rule.points[: self.q]]
+        cell = sorted({float(x[0]) for x in ELEMENTS[self.layout.d.cell].nodes})
+        weights = np.array([float(w) for w in rule.weights]).reshape((self.q,) * self.D)
+        line = weights.sum(axis=tuple(range(self.D - 1))) / 2.0 ** (self.D - 1)
+        return {
+            "points": np.array(at),
+            "nodes": np.array(cell),
+            "to": lagrange(cell, at)[0],
+            "slope_of_nodes": lagrange(cell, at)[1],
+            "slope": lagrange(at, at)[1],
+            "weights": line,
+        }
+
+    # the file -----------------------------------------------------------------------------------
+
+    @property
+    def orders(self) -> list[int]:
+        """Orders with which matrices are assembled: the next one of multigrid, and the own one."""
+        own = self.n - 1
+        next_lower = 2 if own % 2 == 0 and own > 2 else 1
+        return sorted({next_lower, own}) if own <= 2 else [next_lower]
+
+    def text(self, real: str = "double") -> str:
+        """The file. real: "double" or "float"."""
+        kernels = [
+            self._residual(),
+            self._geometry(),
+            self._product(),
+            self._product_geometry(),
+            self._moduli(),
+            self._product_moduli("product_moduli", transposed=False),
+            *([] if self.symmetric else [self._product_moduli("product_transposed", True)]),
+            self._diagonal(),
+            *(self._assemble(order) for order in self.orders),
+        ]
+        d = self.layout.d
+        doc = d.doc.replace("*/", "* /")
+        body = "\n".join([*self._functions(), *kernels])
+        if real == "float":
+            body = single_precision(body)
+        return (
+            "/* Generated by softehl from a page; do not edit.\n"
+            f"   {d.name} on {d.cell}: {doc} */\n"
+            f'#define SOFTEHL_REAL {real}\n#include "{header.NAME}"\n\n{body}'
+        )
+
+    def _functions(self) -> list[str]:
+        """Tables and functions in front of the kernels."""
+        stem, tables = self.layout.d.name, self.tables
+        lines = {"to": Table(tables["to"], 1), "slope": Table(tables["slope"], -1)}
+        texts = [
+            one_lane(sweep(f"{abi.function_name(stem, label)}_{kind}", table, kind))
+            for label, table in lines.items()
+            for kind in ("forth", "back")
+        ]
+        called = dict.fromkeys(r for _, _, some in self.parts.values() for r in some)
+        functions = [
+            point_function.text(self.layout, task, outputs, plan)[0]
+            for task, (outputs, plan, _) in self.parts.items()
+        ]
+        routines = simd_routines.texts(self.layout.site, called)
+        texts += simd_printer.wrappers("".join([*routines, *functions]))
+        if called:
+            texts += [one_lane(t) for t in (c_runtime.LOCAL, *routines)]
+        texts += map(one_lane, functions)
+        weights = ", ".join(number(float(w)) for w in tables["weights"])
+        texts.append(f"TABLE V weights[{self.q}] = {{{weights}}};\n")
+        for order in self.orders:
+            texts.append(_table(f"basis_of_{order}", self.basis(order)))
+        return [*texts, *self._squares()]
+
+    def basis(self, order: int) -> NDArray[np.float64]:
+        """Values and parent slopes (points, nodes, 1 + D) of an order, x running first."""
+        nodes = [-1.0, 1.0] if order == 1 else list(self.tables["nodes"])
+        N, M = lagrange(nodes, list(self.tables["points"]))
+        k, D = len(nodes), self.D
+        q = np.unravel_index(np.arange(self.points), (self.q,) * D)
+        a = np.unravel_index(np.arange(k**D), (k,) * D)
+        values = [N[np.ix_(q[D - 1 - i], a[D - 1 - i])] for i in range(D)]
+        slopes = [M[np.ix_(q[D - 1 - i], a[D - 1 - i])] for i in range(D)]
+        columns = [np.prod(values, axis=0)]
+        for m in range(D):
+            columns.append(np.prod([slopes[i] if i == m else values[i] for i in range(D)], axis=0))
+        return np.stack(columns, axis=-1)
+
+    def _squares(self) -> Iterable[str]:
+        """Functions that sum products of shape functions, and slopes, along a line to the nodes."""
+        N, M = self.tables["to"], self.tables["slope_of_nodes"]
+        for kind, table in (("NN", N * N), ("MM", M * M), ("NM", N * M)):
+            lines = [f"    const V a{k} = a[{k} * step];" for k in range(self.q)]
+            for i in range(self.n):
+                terms = [f"{number(float(table[k, i]))} * a{k}" for k in range(self.q)]
+                lines.append(f"    b[{i} * step] = {' + '.join(terms)};")
+            head = "const V *restrict a, V *restrict b, const int step"
+            body = "\n".join(lines)
+            yield f"DEVICE void squares_{kind}({head})\n{{\n{body}\n}}\n"
+
+    def _kernel(self, name: str, arguments: str, out: Lines) -> str:
+        body = "\n".join(out.lines)
+        word = "KERNEL_LARGE" if name in self._large else "KERNEL"
+        return f"{word}({name}, {self.threads}, int n, {arguments})\n{{\n    BLOCK\n{body}\n}}\n"
+
+    @cached_property
+    def _large(self) -> set[str]:
+        """Kernels that may use all registers of a multiprocessor for one block of threads.
+
+        Those with moduli at the point, and all of a law with routines: with half of the registers
+        they would spill into memory.
+        """
+        large = {"moduli", *(f"assemble{order}" for order in self.orders)}
+        calls = any(called for _, _, called in self.parts.values())
+        return large | ({"residual", "product", "product_geometry"} if calls else set())
+
+    # pieces of a kernel -------------------------------------------------------------------------
+
+    def _shared(self, out: Lines, components: int | None = None) -> None:
+        full = (components or self.C) * self.elements * self.size
+        out.add(f"SHARED V s0[{full}], s1[{full}], sl[{self.D * full}];")
+
+    def _step(self, axis: int) -> int:
+        """Distance of neighbours along an axis in shared memory."""
+        return (1, self.row, self.row * self.m)[axis]
+
+    def _lines(
+        self, out: Lines, function: str, source: str, target: str, axis: int, components: int
+    ) -> None:
+        """Apply a function to all lines along an axis, from an array to another."""
+        m, others = self.m, [self._step(a) for a in range(self.D) if a != axis]
+        each = m ** (self.D - 1)
+        out.open(f"THREADS(l, {components * self.elements * each}, {self.threads})")
+        places = [f"l / {m**k} % {m} * {step}" for k, step in enumerate(others)]
+        out.add(f"const int at = l / {each} * {self.size} + {' + '.join(places)};")
+        out.add(f"{function}(&{source}[at], &{target}[at], {self._step(axis)});")
+        out.close()
+
+    def _sweeps(self, out: Lines, label: str, axes: Iterable[int], components: int) -> None:
+        """All directions, one after the other, from s0; the last array is `_last`."""
+        names = ["s0", "s1"]
+        for axis in axes:
+            function = f"{abi.function_name(self.layout.d.name, label)}"
+            self._lines(out, function, names[0], names[1], axis, components)
+            out.add("SYNC")
+            names.reverse()
+
+    @property
+    def _last(self) -> str:
+        """Array after sweeps along all directions."""
+        return "s1" if self.D % 2 else "s0"
+
+    def _done_with_values(self, out: Lines, *, read: bool) -> None:
+        """A barrier between values that are read at the points and a vector that is written there.
+
+        A thread reads and writes the same places where there are as many nodes as points.
+        """
+        if read and self._last == "s0" and self.n != self.q:
+            out.add("SYNC")
+
+    def _position(self, out: Lines, width: int, letter: str) -> None:
+        """Place `at` in shared memory of the entry `letter` of an element, x running first."""
+        axes = range(self.D)
+        places = [f"{letter} / {width**k} % {width} * {self._step(k)}" for k in axes]
+        out.add(f"const int at = e * {self.size} + {' + '.join(places)};")
+
+    def _to_points(self, out: Lines, vector: str, index: str, components: int) -> None:
+        """Values of a vector from the nodes to the points, in `_last`, and slopes there, in sl."""
+        full = components * self.elements * self.size
+        out.open(f"THREADS(l, {self.elements * self.nodes}, {self.threads})")
+        out.add(f"const int e = l / {self.nodes}, a = l % {self.nodes};")
+        self._position(out, self.n, "a")
+        element = f"block * {self.elements} + e"
+        out.add(f"const int from = {element} < n ? {index}[({element}) * {self.nodes} + a] : -1;")
+        for c in range(components):
+            out.add(
+                f"s0[{c * self.elements * self.size} + at] = from < 0 ? 0 : {vector}[from + {c}];"
+            )
+        out.close()
+        out.add("SYNC")
+        self._sweeps(out, "to_forth", range(self.D), components)
+        function = abi.function_name(self.layout.d.name, "slope_forth")
+        for axis in range(self.D):
+            self._lines(out, function, self._last, f"(sl + {axis * full})", axis, components)
+        out.add("SYNC")
+
+    def _from_points(self, out: Lines, result: str) -> None:
+        """Fluxes in sl, and of values in s0, to the nodes, added to a vector."""
+        full, function = self.C * self.elements * self.size, self.layout.d.name
+        for axis in range(self.D):
+            if axis:
+                out.add("SYNC")  # two threads may add to one place
+            name = abi.function_name(function, "slope_back")
+            self._lines(out, name, f"(sl + {axis * full})", "s0", axis, self.C)
+        # no barrier: the next sweep has the same lines on the same threads
+        self._sweeps(out, "to_back", reversed(range(self.D)), self.C)
+        self._to_nodes(out, result, self._last)
+
+    def _to_nodes(self, out: Lines, result: str, source: str) -> None:
+        """Values at the nodes in an array, added to a vector."""
+        out.open(f"THREADS(l, {self.elements * self.nodes}, {self.threads})")
+        out.add(f"const int e = l / {self.nodes}, a = l % {self.nodes};")
+        self._position(out, self.n, "a")
+        out.open(f"if (block * {self.elements} + e < n)")
+        out.add(f"const int to = index[(block * {self.elements} + e) * {self.nodes} + a];")
+        for c in range(self.C):
+            out.add(f"ADD({result} + to + {c}, {source}[{c * self.elements * self.size} + at]);")
+        out.close()
+        out.close()
+
+    def _own(self, out: Lines) -> None:
+        """The point of a thread."""
+        out.open(f"OWN(t, {self.owners})")
+        out.add(f"const int e = t / {self.points}, q = t % {self.points};")
+        self._position(out, self.q, "q")
+        out.add("(void)at, (void)q;")
+
+    def _slope(self, c: int, axis: int, components: int | None = None) -> str:
+        offset = (axis * (components or self.C) + c) * self.elements * self.size
+        return f"sl[{offset} + at]"
+
+    def _value(self, c: int) -> str:
+        return f"{self._last}[{c * self.elements * self.size} + at]"
+
+    def _map(self, out: Lines) -> None:
+        """Variables of `kept` from coordinates that stand at the points."""
+        for i in range(self.D):
+            for m in range(self.D):
+                out.add(f"const V J{i}{m} = {self._slope(i, m, self.D)};")
+        frame = Frame(self.layout, Task.RESIDUAL, self.parts[Task.RESIDUAL][0])
+        frame.out = out
+        parent_map.write_inverse(frame)
+        if self._positions:
+            for i in range(self.D):
+                out.add(f"const V X{i} = {self._value(i)};")
+        ring = " * ((V)6.283185307179586 * X1)" if self.layout.form.axisymmetric else ""
+        weights = [f"weights[q / {self.q**k} % {self.q}]" for k in range(self.D)]
+        out.add(f"const V w = det * {' * '.join(weights)}{ring};")
+
+    def _of_state(self, out: Lines, task: str, *, kept: bool) -> Needs:
+        """Map and fields of the state at every point, in arrays of its thread."""
+        needs = Needs.of(self.parts[task][0].entries)
+        out.add(f"OWNED(V, frame, {len(self.kept)}, {self.owners});")
+        out.add(f"OWNED(V, state, {max(len(needs['dofs']), 1)}, {self.owners});")
+        if kept:
+            out.open(f"OWN(t, {self.owners})")
+            out.add(f"const V *const from = {self._at_points('kept', len(self.kept))};")
+            for k in range(len(self.kept)):
+                out.add(f"MINE(frame, t)[{k}] = from[{k * self.owners}];")
+            out.close()
+        else:
+            self._to_points(out, "X", "places", self.D)
+            self._own(out)
+            self._map(out)
+            for k, name in enumerate(self.kept):
+                out.add(f"MINE(frame, t)[{k}] = {name};")
+            out.close()
+            self._done_with_values(out, read=self._positions)
+        self._to_points(out, "u", "index", self.C)
+        return needs
+
+    def _at_points(self, array: str, count: int) -> str:
+        """Place of the numbers of a thread's point."""
+        return f"{array} + (long long)block * {count * self.owners} + t"
+
+    def _frame(self, out: Lines) -> None:
+        """Variables of the map from the array of the thread."""
+        for k, name in enumerate(self.kept):
+            out.add(f"const V {name} = MINE(frame, t)[{k}];")
+        out.add(" ".join(f"(void){name};" for name in self.kept))
+
+    def _fields(self, out: Lines, target: str, numbers: Iterable[int]) -> None:
+        """Fields and gradients at the point; target: format of an entry by its number."""
+        components = {c: k for k, c in enumerate(self.layout.components)}
+        for k in numbers:
+            quantity = self.layout.form.all[k]
+            c = components[quantity.component]
+            terms = [f"{self._slope(c, m)} * I{m}{quantity.axis}" for m in range(self.D)]
+            value = self._value(c) if quantity.axis is None else " + ".join(terms)
+            out.add(f"{target.format(k)} = {value};")
+
+    def _arguments(self, out: Lines, task: str, needs: Needs) -> None:
+        """Arrays of the function of the point, but its fields."""
+        outputs, d = self.parts[task][0], self.layout.d
+        sizes = {
+            "x": self.D,
+            "g": len(self.layout.form.all),
+            "b": len(d.point_data),
+            "v": 1 + max([*needs["direction"], 0]),
+            "P": len(outputs.rows),
+            "A": len(outputs.moduli),
+        }
+        arrays = ", ".join(f"{name}[{max(size, 1)}]" for name, size in sizes.items())
+        out.add(f"V {arrays};")
+        out.add("(void)x;")
+        for k in needs["coordinates"]:
+            out.add(f"x[{k}] = X{k};")
+        if needs["point data"]:
+            out.add(f"const V *const past = {self._at_points('history', len(d.point_data))};")
+            for k in needs["point data"]:
+                out.add(f"b[{k}] = past[{k * self.owners}];")
+
+    def _call(self, out: Lines, task: str) -> None:
+        function = point_function.name(self.layout, task)
+        out.add(f"const M failed = {function}(parameters, x, g, (const V *)0, b, v, P, A);")
+
+    def _fluxes(self, out: Lines) -> None:
+        """Fluxes at the point overwrite the arrays; all are not-a-number where it has failed."""
+        places = {q: f"P[{k}]" for k, q in enumerate(self.layout.form.unknowns)}
+        out.add("const V volume = failed ? (V)NAN : w;")
+        for k, c in enumerate(self.layout.components):
+            value = places.get(Quantity(c, None))
+            text = f"volume * {value}" if value else "0"
+            out.add(f"s0[{k * self.elements * self.size} + at] = {text};")
+            of_slopes = {q.axis: v for q, v in places.items() if q.component == c}
+            of_slopes.pop(None, None)
+            for m in range(self.D):
+                total = " + ".join(f"{v} * I{m}{axis}" for axis, v in of_slopes.items())
+                flux = f"volume * ({total})" if of_slopes else "0"
+                out.add(f"{self._slope(k, m)} = {flux};")
+
+    # kernels ------------------------------------------------------------------------------------
+
+    def _residual(self) -> str:
+        out = Lines()
+        self._shared(out, max(self.C, self.D))
+        needs = self._of_state(out, Task.RESIDUAL, kept=False)
+        self._own(out)
+        self._frame(out)
+        self._arguments(out, Task.RESIDUAL, needs)
+        self._fields(out, "g[{}]", needs["dofs"])
+        self._call(out, Task.RESIDUAL)
+        self._fluxes(out)
+        out.close()
+        out.add("SYNC")
+        self._from_points(out, "y")
+        return self._kernel("residual", _OF_STATE + "V *restrict y", out)
+
+    def _geometry(self) -> str:
+        out = Lines()
+        self._shared(out, self.D)
+        self._to_points(out, "X", "places", self.D)
+        self._own(out)
+        self._map(out)
+        out.add(f"V *const to = {self._at_points('kept', len(self.kept))};")
+        for k, name in enumerate(self.kept):
+            out.add(f"to[{k * self.owners}] = {name};")
+        out.close()
+        arguments = "const int *restrict places, const V *restrict X, V *restrict kept"
+        return self._kernel("geometry", arguments, out)
+
+    def _product(self) -> str:
+        out = Lines()
+        self._shared(out, max(self.C, self.D))
+        self._product_at(out, kept=False)
+        return self._kernel("product", _OF_STATE + "const V *restrict x, V *restrict y", out)
+
+    def _product_geometry(self) -> str:
+        out = Lines()
+        self._shared(out)
+        self._product_at(out, kept=True)
+        arguments = (
+            "const V *restrict parameters, const V *restrict history, const int *restrict index, "
+            "const V *restrict kept, const V *restrict u, const V *restrict x, V *restrict y"
+        )
+        return self._kernel("product_geometry", arguments, out)
+
+    def _product_at(self, out: Lines, *, kept: bool) -> None:
+        needs = self._of_state(out, Task.PRODUCT, kept=kept)
+        self._own(out)
+        self._frame(out)
+        for n, k in enumerate(needs["dofs"]):
+            self._fields(out, f"MINE(state, t)[{n}]", [k])
+        out.close()
+        form = self.layout.form
+        self._done_with_values(out, read=any(form.all[k].axis is None for k in needs["dofs"]))
+        self._to_points(out, "x", "index", self.C)
+        self._own(out)
+        self._frame(out)
+        self._arguments(out, Task.PRODUCT, needs)
+        for n, k in enumerate(needs["dofs"]):
+            out.add(f"g[{k}] = MINE(state, t)[{n}];")
+        self._fields(out, "v[{}]", needs["direction"])
+        self._call(out, Task.PRODUCT)
+        self._fluxes(out)
+        out.close()
+        out.add("SYNC")
+        self._from_points(out, "y")
+
+    def _moduli(self) -> str:
+        out = Lines()
+        self._shared(out, max(self.C, self.D))
+        needs = self._of_state(out, Task.TANGENT, kept=False)
+        self._own(out)
+        self._frame(out)
+        self._arguments(out, Task.TANGENT, needs)
+        self._fields(out, "g[{}]", needs["dofs"])
+        self._call(out, Task.TANGENT)
+        out.add(f"V *const to = {self._at_points('kept', self.parent.size)};")
+        out.add("const V spoilt = failed ? (V)NAN : (V)0;")
+        pulled = Lines(depth=out.depth)
+        pull_back(pulled, self.layout, self.parts[Task.TANGENT][0])
+        text = "\n".join(pulled.lines)
+
+        def place(m: re.Match[str]) -> str:
+            return f"to[{int(m[1]) * self.owners}] = spoilt + "
+
+        out.lines.append(re.sub(r"S\[q\]\[(\d+)\] = ", place, text))
+        out.close()
+        return self._kernel("moduli", _OF_STATE + "V *restrict kept", out)
+
+    def _product_moduli(self, name: str, transposed: bool) -> str:
+        out, parent = Lines(), self.parent
+        self._shared(out)
+        self._to_points(out, "x", "index", self.C)
+        self._own(out)
+        out.add(f"const V *const from = {self._at_points('kept', parent.size)};")
+        components = {c: k for k, c in enumerate(self.layout.components)}
+        label = {
+            q: f"{components[q.component]}{'v' if q.axis is None else q.axis}"
+            for q in parent.quantities
+        }
+        for q, text in label.items():
+            c = components[q.component]
+            value = self._value(c) if q.axis is None else self._slope(c, q.axis)
+            out.add(f"const V d{text} = {value};")
+            out.add(f"V f{text} = 0;")
+        for pair, k in parent.numbers.items():
+            row, column = pair[::-1] if transposed else pair
+            out.open("")
+            out.add(f"const V s = from[{k * self.owners}];")
+            out.add(f"f{label[row]} += s * d{label[column]};")
+            if parent.symmetric and row != column:
+                out.add(f"f{label[column]} += s * d{label[row]};")
+            out.close()
+        for component, k in components.items():
+            of_value = label.get(Quantity(component, None))
+            flux = f"f{of_value}" if of_value else "0"
+            out.add(f"s0[{k * self.elements * self.size} + at] = {flux};")
+            for m in range(self.D):
+                of_slope = label.get(Quantity(component, m))
+                out.add(f"{self._slope(k, m)} = {f'f{of_slope}' if of_slope else '0'};")
+        out.close()
+        out.add("SYNC")
+        self._from_points(out, "y")
+        arguments = (
+            "const V *restrict kept, const int *restrict index, const V *restrict x, V *restrict y"
+        )
+        return self._kernel(name, arguments, out)
+
+    def _diagonal(self) -> str:
+        """Sums over the points of products of shape functions and slopes with moduli."""
+        out, parent = Lines(), self.parent
+        self._shared(out)
+        full = self.C * self.elements * self.size
+        groups: dict[tuple[int | None, int | None], list[tuple[int, str]]] = {}
+        axes: list[int | None] = [None, *range(self.D)]
+        for c, k in ((c, k) for k, c in enumerate(self.layout.components)):
+            for a, b in combinations_with_replacement(axes, 2):
+                pairs = {(a, b), (b, a)}
+                numbers = [parent.number(Quantity(c, i), Quantity(c, j)) for i, j in pairs]
+                terms = [f"from[{i * self.owners}]" for i in numbers if i is not None]
+                if terms:
+                    groups.setdefault((a, b), []).append((k, " + ".join(terms)))
+        out.open(f"THREADS(l, {full}, {self.threads})")
+        out.add("sl[l] = 0;")
+        out.close()
+        for number_of_group, ((a, b), entries) in enumerate(groups.items()):
+            if number_of_group and self._last == "s0":
+                out.add("SYNC")  # the last sums have been read from it
+            self._own(out)
+            out.add(f"const V *const from = {self._at_points('kept', parent.size)};")
+            values = dict(entries)
+            for k in range(self.C):
+                text = values.get(k, "0")
+                out.add(f"s0[{k * self.elements * self.size} + at] = {text};")
+            out.close()
+            out.add("SYNC")
+            names = ["s0", "s1"]
+            for axis in range(self.D):
+                kind = ("NN", "NM", "MM")[(a == axis) + (b == axis)]
+                self._lines(out, f"squares_{kind}", names[0], names[1], axis, self.C)
+                out.add("SYNC")
+                names.reverse()
+            out.open(f"THREADS(l, {full}, {self.threads})")
+            out.add(f"sl[l] += {self._last}[l];")
+            out.close()
+        out.add("SYNC")
+        self._to_nodes(out, "y", "sl")
+        return self._kernel(
+            "diagonal", "const V *restrict kept, const int *restrict index, V *restrict y", out
+        )
+
+    def _assemble(self, order: int) -> str:
+        """B' S B of some elements at a time; a thread has a column of an element, or a part."""
+        out, parent, C = Lines(), self.parent, self.C
+        k = (order + 1) ** self.D
+        wide = parent.size | 1
+        each = max(1, min(self.elements, SHARED // (DOUBLE * wide * self.points)))
+        slice_points = self.points
+        while DOUBLE * wide * slice_points * each > SHARED:  # the points in slices, of one element
+            slice_points = -(-slice_points // 2)
+        out.add(f"SHARED V S[{each * slice_points}][{wide}];")
+        parts = max(1, min(k, self.threads // (C * k * each), -(-C * k // 24)))
+        parts = max(parts, -(-C * k // 96))
+        rows = -(-k // parts)
+        columns = C * each * k * parts
+        rounds = -(-columns // self.threads)
+        out.open(f"for (int some = 0; some < {self.elements}; some += {each})")
+        out.open(f"for (int turn = 0; turn < {rounds}; ++turn)")
+        out.add(f"OWNED(V, sums, {C * rows}, {self.threads});")
+        whole = f"for (int first = 0; first < {self.points}; first += {slice_points})"
+        out.open(whole)
+        out.add("SYNC")
+        out.open(f"THREADS(l, {each * slice_points * parent.size}, {self.threads})")
+        out.add(f"const int p = l % {each * slice_points}, number = l / {each * slice_points};")
+        out.add(f"const int e = p / {slice_points}, q = first + p % {slice_points};")
+        out.add(
+            f"const long long at = ((long long)block * {parent.size} + number) * {self.owners} "
+            f"+ (some + e) * {self.points} + q;"
+        )
+        out.add(f"S[p][number] = some + e < {self.elements} && q < {self.points} ? kept[at] : 0;")
+        out.close()
+        out.add("SYNC")
+        out.open(f"OWN(l, {self.threads})")
+        out.open(f"if (turn * {self.threads} + l < {columns})")
+        self._column(out, k, each, parts)
+        out.add("V *const r = MINE(sums, l);")
+        out.add(f"UNROLL for (int i = 0; first == 0 && i < {C * rows}; ++i) r[i] = 0;")
+        out.add(
+            f"const int last = {self.points} - first < {slice_points} "
+            f"? {self.points} - first : {slice_points};"
+        )
+        for j in range(C):
+            out.open(f"{'else ' if j else ''}if (c == {j})")
+            out.open("for (int p = 0; p < last; ++p)")
+            out.add(f"const V *const N = basis_of_{order}[first + p][b];")
+            out.add(f"const V *const s = S[e * {slice_points} + p];")
+            used = self._half_column(out, j)
+            out.open(f"UNROLL for (int a = 0; a < {rows}; ++a)")
+            out.add(f"const int node = part * {rows} + a;")
+            out.open(f"if (node < {k})")
+            out.add(f"const V *const B = basis_of_{order}[first + p][node];")
+            for i, terms in used.items():
+                total = " + ".join(f"{name} * B[{at}]" for at, name in terms)
+                out.add(f"r[{C} * a + {i}] += {total};")
+            out.close()
+            out.close()
+            out.close()
+            out.close()
+        out.close()
+        out.close()
+        out.close()
+        out.open(f"OWN(l, {self.threads})")
+        out.open(f"if (turn * {self.threads} + l < {columns})")
+        self._column(out, k, each, parts)
+        out.add(f"const int el = block * {self.elements} + some + e;")
+        out.add("const V *const r = MINE(sums, l);")
+        out.open(f"if (some + e < {self.elements} && el < n)")
+        out.open(f"UNROLL for (int a = 0; a < {rows}; ++a)")
+        out.add(f"const int node = part * {rows} + a;")
+        out.open(f"if (node < {k})")
+        out.add(f"const long long pair = ((long long)el * {k} + node) * {k} + b;")
+        out.add(f"const int row = low[el * {k} + node], place = {C} * slots[pair] + c;")
+        for i in range(C):
+            out.add(f"ADD(values + rows[row + {i}] + place, r[{C} * a + {i}]);")
+        for _ in range(7):
+            out.close()
+        arguments = (
+            "const V *restrict kept, const int *restrict low, const int *restrict rows, "
+            "const unsigned short *restrict slots, V *restrict values"
+        )
+        return self._kernel(f"assemble{order}", arguments, out)
+
+    def _column(self, out: Lines, k: int, each: int, parts: int) -> None:
+        """Component c, node b, element e and part of the rows of a thread."""
+        out.add(f"const int own = turn * {self.threads} + l;")
+        out.add(f"const int c = own / {each * k * parts}, b = own % {k};")
+        out.add(f"const int e = own / {k} % {each}, part = own / {k * each} % {parts};")
+
+    def _half_column(self, out: Lines, j: int) -> dict[int, list[tuple[int, str]]]:
+        """S B of a column of the component j: component of the rows -> place in B and a name."""
+        parent, components = self.parent, self.layout.components
+        column = components[j]
+        of_rows: dict[int, list[tuple[int, str]]] = {}
+        for i, c in enumerate(components):
+            for q in parent.of(c):
+                terms = []
+                for o in parent.of(column):
+                    entry = parent.number(q, o)
+                    if entry is not None:
+                        terms.append(f"s[{entry}] * N[{0 if o.axis is None else 1 + o.axis}]")
+                if terms:
+                    at = 0 if q.axis is None else 1 + q.axis
+                    name = f"T{i}{at}"
+                    out.add(f"const V {name} = {' + '.join(terms)};")
+                    of_rows.setdefault(i, []).append((at, name))
+        return of_rows
+
+
+_OF_STATE = (
+    "const V *restrict parameters, const V *restrict history, const int *restrict index, "
+    "const int *restrict places, const V *restrict X, const V *restrict u, "
+)
+
+
+def _table(name: str, values: NDArray[np.float64]) -> str:
+    """A constant array of three indices."""
+    rows = ",\n".join(
+        "{" + ", ".join("{" + ", ".join(number(float(v)) for v in r) + "}" for r in point) + "}"
+        for point in values
+    )
+    size = "".join(f"[{k}]" for k in values.shape)
+    return f"TABLE V {name}{size} = {{\n{rows}}};\n"

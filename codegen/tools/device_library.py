@@ -1,0 +1,75 @@
+"""Device kernels of a page for the runtime: their text, and their library for the processor."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+from softehl.codegen import pipeline
+from softehl.codegen.abi import BuildError, NoCompilerError
+from softehl.codegen.emit.device import header
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.tools import cache_dir
+from softehl.codegen.tools.page_evaluation import definition_of
+from softehl.runtime.device.device_source import DeviceSource
+
+FLAGS = ("-O2", "-march=native", "-std=c++17", "-shared", "-fPIC", "-w")
+
+
+def source_of(folder: Path, kernel: str, real: str = "double") -> DeviceSource:
+    """Device kernels of a kernel of a library.  Raises `TargetError`, `ModelFileError`."""
+    return device_source(definition_of(folder, kernel), real)
+
+
+def device_source(definition: Definition, real: str = "double") -> DeviceSource:
+    """Device kernels of a page on a kind of cell.  Raises `TargetError`."""
+    kernels = pipeline.device_kernels(definition)
+    text = kernels.text(real)
+    found = re.findall(r"^KERNEL(?:_LARGE)?\((\w+), \d+, int n, (.*)\)$", text, re.MULTILINE)
+    return DeviceSource(
+        name=definition.name,
+        files={
+            f"{definition.name}.cu": text,
+            header.NAME: header.TEXT,
+            header.FIBERS: header.FIBERS_TEXT,
+        },
+        elements=kernels.elements,
+        threads=kernels.threads,
+        dimension=kernels.D,
+        components=kernels.C,
+        line=kernels.q,
+        geometry=len(kernels.kept),
+        moduli=kernels.parent.size,
+        history=len(definition.point_data),
+        symmetric=kernels.symmetric,
+        orders=tuple(kernels.orders),
+        kernels={name: arguments.count("*") for name, arguments in found},
+        real="float32" if real == "float" else "float64",
+    )
+
+
+def emulated_library(source: DeviceSource, fibers: bool = False) -> Path:
+    """The kernels compiled as C++, from the cache.  Raises `BuildError`."""
+    compiler = os.environ.get("CXX") or shutil.which("c++") or shutil.which("g++")
+    if compiler is None:
+        raise NoCompilerError("emulated device: no C++ compiler; set $CXX")
+    command = [*compiler.split(), *FLAGS, *(["-DSOFTEHL_FIBERS"] if fibers else [])]
+    digest = hashlib.sha256("\0".join([*source.files.values(), *command]).encode()).hexdigest()
+    folder = cache_dir.root() / "device" / digest[:32]
+    library = folder / "kernels.so"
+    if library.is_file():
+        return library
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in source.files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    made = folder / f"kernels-{os.getpid()}.so"
+    command += ["-x", "c++", str(folder / next(iter(source.files))), "-o", str(made)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise BuildError(f"{' '.join(command)} failed: {done.stderr.strip()[:2000]}")
+    made.replace(library)
+    return library

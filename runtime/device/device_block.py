@@ -1,0 +1,171 @@
+"""Element block on a device: its arrays there, and its kernels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.device import device_source
+from softehl.runtime.device.device_module import DeviceModule, device_module
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.matrix_free_products import (
+    by_components,
+    lexicographic,
+    require_product,
+)
+from softehl.runtime.kernels.kernel import Kernel
+from softehl.runtime.mesh.cells import CELLS
+
+
+def load_module(kernel: Kernel, device: str, real: str = "double") -> DeviceModule:
+    """Device kernels of a kernel.  Raises DeviceError, `TargetError`."""
+    directory = kernel.library.directory
+    return device_module(device_source.device_source(directory, kernel.name, real), device)
+
+
+@dataclass(eq=False)
+class DeviceBlock:
+    """Arrays of a block on a device, in the order of its kernels.
+
+    index: (n, nodes) places of the first unknown of each node in vectors. places: of its
+    coordinates in X, (m, dimension). history: (blocks, numbers, points of a block), or None. All
+    methods take and return arrays of the device; vectors have the unknowns of a node as neighbours.
+    """
+
+    module: DeviceModule
+    n: int
+    index: Any
+    places: Any
+    X: Any
+    parameters: Any
+    history: Any
+
+    @classmethod
+    def of(
+        cls, block: ElementBlock, parameters: Array, module: DeviceModule, position: Integers
+    ) -> DeviceBlock:
+        """position: place of each unknown of the system in the vectors."""
+        kernel = require_product(block)
+        order = lexicographic(CELLS[kernel.cell])
+        dofs = block.dofs[:, by_components(kernel)[order]]
+        X = block.coordinates.reshape(len(dofs), -1, module.source.dimension)[:, order]
+        nodes = np.arange(dofs.shape[0] * dofs.shape[1]).reshape(dofs.shape[:2])
+        return cls(
+            module,
+            len(dofs),
+            module.array(position[dofs[:, :, 0]].astype(np.int32)),
+            module.array((nodes * X.shape[2]).astype(np.int32)),
+            module.real(X.reshape(-1, X.shape[2])),
+            module.real(np.append(parameters, 0.0)),
+            cls._history(block, module),
+        )
+
+    @staticmethod
+    def _history(block: ElementBlock, module: DeviceModule) -> Any:
+        """History with x running first in the points, block by block."""
+        source = module.source
+        if not source.history:
+            return None
+        n, q, D, k = len(block.dofs), source.line, source.dimension, source.history
+        assert block.point_data is not None
+        padded = np.zeros((source.blocks(n) * source.elements, *(q,) * D, k))
+        axes = (0, *range(D, 0, -1), D + 1)
+        padded[:n] = block.point_data.reshape(n, *(q,) * D, k).transpose(axes)
+        grouped = padded.reshape(source.blocks(n), source.elements * source.points, k)
+        return module.real(grouped.transpose(0, 2, 1))
+
+    def _kept(self, n: int, numbers: int) -> Any:
+        source = self.module.source
+        return self.module.zeros(source.blocks(n), numbers, source.elements * source.points)
+
+    @cached_property
+    def geometry(self) -> Any:
+        """Inverse Jacobian and volume at the points."""
+        kept = self._kept(self.n, self.module.source.geometry)
+        self.module.launch("geometry", self.n, (self.places, self.X, kept))
+        return kept
+
+    def residual(self, u: Any, y: Any) -> None:
+        """y += residual at u."""
+        arrays = self.parameters, self.history, self.index, self.places, self.X, u, y
+        self.module.launch("residual", self.n, arrays)
+
+    def product(self, u: Any, x: Any, y: Any) -> None:
+        """y += K(u) x, with the geometry kept."""
+        arrays = self.parameters, self.history, self.index, self.geometry, u, x, y
+        self.module.launch("product_geometry", self.n, arrays)
+
+    def product_recomputed(self, u: Any, x: Any, y: Any) -> None:
+        """y += K(u) x, with nothing kept."""
+        arrays = (self.parameters, self.history, self.index, self.places, self.X, u, x, y)
+        self.module.launch("product", self.n, arrays)
+
+    def moduli(self, u: Any) -> Any:
+        """Moduli of the parent cell at the points."""
+        kept = self._kept(self.n, self.module.source.moduli)
+        arrays = self.parameters, self.history, self.index, self.places, self.X, u, kept
+        self.module.launch("moduli", self.n, arrays)
+        return kept
+
+    def product_of_moduli(self, moduli: Any, x: Any, y: Any, *, transposed: bool = False) -> None:
+        """y += K x, or K' x, of moduli."""
+        swapped = transposed and not self.module.source.symmetric
+        kernel = "product_transposed" if swapped else "product_moduli"
+        self.module.launch(kernel, self.n, (moduli, self.index, x, y))
+
+    def diagonal(self, moduli: Any, y: Any) -> None:
+        """y += diagonal of K."""
+        self.module.launch("diagonal", self.n, (moduli, self.index, y))
+
+    def assemble(self, order: int, moduli: Any, pattern: SparsePattern, values: Any) -> None:
+        """values += entries of P' K P, with P from the shape functions of an order."""
+        arrays = moduli, pattern.low, pattern.rows, pattern.slots, values
+        self.module.launch(f"assemble{order}", self.n, arrays)
+
+
+@dataclass(frozen=True, eq=False)
+class SparsePattern:
+    """Places of the entries of elements in a CSR matrix.
+
+    low: (n, k) first unknown of each node; rows: (size + 1,) start of every row; slots: (n, k, k)
+    place of the second node among the neighbours of the first; all on the device. starts, columns:
+    of the matrix, on the host.
+    """
+
+    low: Any
+    rows: Any
+    slots: Any
+    starts: Integers
+    columns: Integers
+
+    @property
+    def count(self) -> int:
+        """Number of entries."""
+        return len(self.columns)
+
+    @classmethod
+    def of(
+        cls, nodes: Integers, components: int, module: DeviceModule, size: int | None = None
+    ) -> SparsePattern:
+        """For elements with these nodes, (n, k), numbered from 0; size: number of all nodes."""
+        count, k = size or int(nodes.max()) + 1, nodes.shape[1]
+        i, j = np.repeat(nodes, k, axis=1).ravel(), np.tile(nodes, k).ravel()
+        pairs, inverse = np.unique(i.astype(np.int64) * count + j, return_inverse=True)
+        start = np.searchsorted(pairs, np.arange(count + 1) * count)
+        lengths = components * np.diff(start)
+        rows = np.concatenate([[0], np.cumsum(np.repeat(lengths, components))])
+        slots = (inverse - start[i]).reshape(len(nodes), k, k)
+        neighbours = (components * (pairs % count))[:, None] + np.arange(components)
+        blocks = [np.tile(neighbours[a:b].ravel(), components) for a, b in pairwise(start)]
+        return cls(
+            low=module.array((components * nodes).astype(np.int32)),
+            rows=module.array(rows.astype(np.int32)),
+            slots=module.array(slots.astype(np.uint16)),
+            starts=rows,
+            columns=np.concatenate(blocks),
+        )

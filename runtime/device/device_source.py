@@ -1,0 +1,73 @@
+"""Device kernels of a page, as text with their sizes; `softehl` sets the function that prints them.
+
+The runtime has no compiler of pages.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+
+@dataclass(frozen=True)
+class DeviceSource:
+    """Text of the kernels of a page on a kind of cell; see `softehl.codegen.emit.device.kernels`.
+
+    files: text by name of the file that is compiled, first, and of its headers. elements: of a
+    block of threads. dimension, components, line: of the cell, of a node, points along a line.
+    geometry, moduli: numbers of a point that `geometry` and `moduli` store. history: numbers of a
+    point. symmetric: whether the tangent is. orders: with which matrices are assembled. kernels:
+    name -> number of its arrays. real: type of NumPy of its numbers.
+    """
+
+    name: str
+    files: dict[str, str]
+    elements: int
+    threads: int
+    dimension: int
+    components: int
+    line: int
+    geometry: int
+    moduli: int
+    history: int
+    symmetric: bool
+    orders: tuple[int, ...]
+    kernels: dict[str, int]
+    real: str = "float64"
+
+    @property
+    def joined(self) -> str:
+        """One text, with the header of the device in place of its line."""
+        (_, text), (name, header), *_ = self.files.items()
+        return text.replace(f'#include "{name}"', header)
+
+    @property
+    def points(self) -> int:
+        """Points of an element."""
+        return int(self.line**self.dimension)
+
+    def blocks(self, n: int) -> int:
+        """Blocks of threads for n elements."""
+        return -(-n // self.elements)
+
+
+class DeviceSourceOf(Protocol):
+    """Function that prints the device kernels of a kernel of a library in a folder."""
+
+    def __call__(self, folder: Path, kernel: str, real: str) -> DeviceSource:
+        """Return them; raises `TargetError` for a page that a device cannot run."""
+        ...
+
+
+class EmulatedLibraryOf(Protocol):
+    """Function that compiles device kernels for the processor; fibers: a thread is a fiber."""
+
+    def __call__(self, source: DeviceSource, fibers: bool) -> Path:
+        """Return the library; raises `BuildError` without a C++ compiler."""
+        ...
+
+
+device_source: DeviceSourceOf
+emulated_library: EmulatedLibraryOf
+"""The package sets both when it is imported."""
