@@ -480,6 +480,28 @@ def adhesion(figure: Figure, space: dict[str, Any]) -> None:
     right.set(xlabel="radius [mm]", ylabel="tension / strength", ylim=(-0.6, 1.1))
 
 
+def rigid(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2)
+    for turn, colour in zip((0.25, 0.5, 0.75, 1.0), (GREY, GREEN, BLUE, ORANGE), strict=True):
+        state = min(space["states"], key=lambda state: abs(state.t - turn))
+        ((_, faces),) = state.system.mesh.faces("bottom").items()
+        nodes = np.unique(faces)
+        place = state.system.mesh.points[nodes]
+        moved = place + np.stack([state.values(n)[nodes] for n in ("u_x", "u_y")], axis=1)
+        order = np.argsort(place[:, 0])
+        left.plot(*moved[order].T, color=colour, label=f"{state.t:.2f} turn")
+    left.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
+    left.legend(fontsize=7, loc="upper right")
+    y, p = (space["fields"][n].ravel() for n in ("y", "pressure"))
+    near, r = y < 2 * space["a"], np.linspace(0, 1, 200)
+    right.plot(r, np.sqrt(1 - r**2), "k", lw=0.8, label="Hertz")
+    right.plot(
+        y[near] / space["a"], p[near] / space["peak"], ".", color=ORANGE, label="60 x 60 cells"
+    )
+    right.set(xlabel="r / a", ylabel="pressure / peak of Hertz")
+    right.legend()
+
+
 def laminate(figure: Figure, space: dict[str, Any]) -> None:
     left, right = figure.subplots(1, 2, width_ratios=[1, 1.2])
     result = space["sheared"].result
@@ -611,6 +633,7 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "laminate": laminate,
     "two-scales": two_scales,
     "impact": impact,
+    "rigid": rigid,
     "adhesion": adhesion,
 }
 
