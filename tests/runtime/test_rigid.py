@@ -243,6 +243,27 @@ def test_a_ring_moves_along_its_axis() -> None:
         studies[0].load("end", theta=1.0)
 
 
+def test_a_rigid_inclusion_is_a_very_stiff_one() -> None:
+    """Mean stress and tangent of a periodic cell."""
+
+    def inside(x: Any) -> Any:
+        return np.linalg.norm(x - 0.5, axis=1) < 0.26
+
+    mesh = Mesh.rectangle(1, 1, cells=(8, 8)).with_group("core", inside)
+    mesh = mesh.with_group("rest", lambda x: ~inside(x))
+    F, found = np.array([[1.05, 0.1], [0.0, 0.98]]), []
+    for rigid in (True, False):
+        study = Study(mesh)
+        study.add("rest", material="neo_hooke", mu=1.0, kappa=3.0, cells="rest")
+        if rigid:
+            study.rigid("core", name="inclusion")
+        else:
+            study.add("core", material="neo_hooke", mu=1e6, kappa=3e6, cells="core")
+        found.append(study.periodic(("left", "right"), ("bottom", "top")).solve(F))
+    np.testing.assert_allclose(found[0].P, found[1].P, rtol=2e-5)
+    np.testing.assert_allclose(found[0].A, found[1].A, rtol=2e-5, atol=2e-5)
+
+
 REFUSED: dict[str, tuple[Callable[[Any], Any], str]] = {
     "side": (lambda s: s.rigid("top", name="left"), "is a side or a group of the mesh"),
     "taken": (lambda s: s.rigid("top", name="grip"), "the name is taken: bar, grip"),
