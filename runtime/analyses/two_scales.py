@@ -13,6 +13,7 @@ import subprocess
 import sys
 import weakref
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
@@ -339,9 +340,12 @@ def _without_definition(cell: Cell) -> Cell:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a process without waiting for its task."""
+    process.kill()
     for stream in (process.stdin, process.stdout):
         if stream is not None:
-            stream.close()
+            with suppress(OSError):  # a request that was not sent
+                stream.close()
     process.wait()
 
 
