@@ -127,12 +127,15 @@ def test_the_kernels_that_ship_are_tuned_by_it(alone: Program) -> None:
 
 
 FUNCTION = """
-import sympy as sp, softehl
+from pathlib import Path
+import softehl
+
+source = Path(__file__).with_name("square.c")
 
 @softehl.page
 def bar(m):
     u = m.scalar("u")
-    (y,) = m.external("square", [u], outputs=1, source="square.c")
+    y = m.external("square", [u], source=source, derivatives=2)
     m.minimise(y + sum(g**2 for g in m.grad(u)))
 
 kernel = softehl.load_kernel(bar, cell="quad4")
