@@ -70,7 +70,7 @@ def _long(relation: str, at: Problem) -> bool:
     """Whether a march takes too many stable steps for what it would show."""
     if at.analysis != "explicit":
         return False
-    return relation not in EXPLICIT or at.cell != AXES["cell"][0]
+    return relation not in EXPLICIT or at.cell != AXES["cell"][0] or at.law == "unit cells"
 
 
 def refusal(crossing: Crossing) -> str | None:

@@ -247,3 +247,16 @@ def test_what_is_no_unit_cell_is_refused() -> None:
     study.fix("left", u_x=0, u_y=0)
     with pytest.raises(StudyError, match="which MatrixFree does not solve"):
         study.solve(options=SolverOptions(linear="matrix-free"))
+
+
+@pytest.mark.parametrize("method", ["explicit", "newmark"])
+def test_a_body_with_cells_moves_as_the_body_itself(method: Any) -> None:
+    states = []
+    for body in (RUBBER, {"cell": unit_cell(RUBBER)}):
+        study = Study(Mesh.rectangle(1, 1, cells=(1, 1)))
+        study.add("body", **body)
+        study.fix("left", u_x=0, u_y=0)
+        study.load("right", u_y=0.02)
+        path = study.march(dt=0.2, until=0.4, method=method, mass={"body": {"rho": 1e-3}})
+        states.append([r.x for r in path][-1])
+    assert np.abs(states[0] - states[1]).max() < 1e-12 * np.abs(states[0]).max()
