@@ -204,7 +204,8 @@ class Forces:
         conditions[roles.multipliers] = parts["contact"][roles.multipliers]
         for name in ("tie", "contact"):
             parts[name][roles.multipliers] = 0.0
-        return cls(*parts.values(), conditions)
+        load, energy, work, tie, contact = parts.values()
+        return cls(load, energy, work, tie, contact, conditions)
 
     @property
     def total(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Sized
 from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
@@ -194,8 +194,8 @@ class ProblemDefinition:
     @property
     def size(self) -> int:
         """Number of blocks, bodies, contacts, supports, loads, initial values; it only grows."""
-        counted = (self.blocks, self.rigids, self.contacts, self.conditions, self.forces)
-        return sum(map(len, (*counted, self.start, self.point_values)))
+        counted: tuple[Sized, ...] = (self.blocks, self.rigids, self.contacts, self.conditions)
+        return sum(map(len, (*counted, self.forces, self.start, self.point_values)))
 
     def prescribed(self, name: str) -> Integers:
         """Nodes at which an unknown is prescribed."""

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.contact.body_thickness import inner_radii, thickness
 from softehl.runtime.contact.mortar_pair import MortarPairKernel
 from softehl.runtime.contact.pair_law import LawContact, PairLawKernel, corner_areas
@@ -219,7 +219,7 @@ def _field(numbering: Numbering, request: ContactRequest, name: str) -> Integers
 def _count(request: ContactRequest, name: str, dofs: Integers, faces: tuple[str, Integers]) -> int:
     """Number of nodes of a face with a field: all, or the corners.  Raises StudyError."""
     kind, nodes = faces
-    defined = (dofs[nodes] >= 0).all(axis=0)
+    defined: Flags = np.asarray((dofs[nodes] >= 0).all(axis=0))
     corners = CELLS[kind].corners
     if defined.all():
         return len(defined)

@@ -79,7 +79,9 @@ def test_without_sympy_kernels_are_shown_and_used(monkeypatch: pytest.MonkeyPatc
     code = "softehl.load_kernel('film'); sys.exit(softehl.main(['kernels']))"
     command = [sys.executable, "-c", NO_SYMPY + code]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1].startswith("tuned library: ")
+    library, compiler = done.stdout.splitlines()[-2:]
+    assert library.startswith("tuned library: ")
+    assert compiler.startswith("compiler ")
 
 
 # --------------------------------------------------------------------------------- installations

@@ -151,7 +151,8 @@ class UnitCells(Law):
         plane = study.mesh.dimension == 2
         mesh = Mesh.rectangle(1, 1, cells=(2, 1)) if plane else Mesh.box((1, 1, 1), cells=(2, 1, 1))
         cell = Study(mesh)
-        super().add(cell, again=again, **constants)
+        given: dict[str, Any] = dict(constants)
+        super().add(cell, again=again, **given)
         pairs = [("left", "right"), ("bottom", "top"), ("front", "back")]
         study.add(name, cell=cell.periodic(*pairs[: mesh.dimension]), cells=cells)
 
