@@ -943,13 +943,16 @@ class Model(ModelBuilder):
         """
         return self._smooth.rotation(w)
 
-    def rotation_vector(self, R: Any) -> Any:
+    def rotation_vector(self, R: Any, *, branches: bool = True) -> Any:
         """Return the rotation vector of a rotation, the inverse of `rotation`.
 
         Parameters
         ----------
         R : Matrix
             Rotation (3, 3).
+        branches : bool
+            False: one formula in place of four, for rotations well below half a turn, such as those
+            between the nodes of an element; digits are lost near half a turn.
 
         Returns
         -------
@@ -962,7 +965,7 @@ class Model(ModelBuilder):
         ModelError
             R has another shape.
         """
-        return self._smooth.rotation_vector(R)
+        return self._smooth.rotation_vector(R, branches=branches)
 
     def derivative(self, name: str, value: Any, by: Any) -> Any:
         """Return derivatives of a scalar, such as P = dW/dF.

@@ -40,11 +40,12 @@ class SmoothFunctions:
         half = self._of_length([a / 2 for a in v])
         return sp.eye(3) + self._of_length(v) * W + half**2 / 2 * (W * W)
 
-    def rotation_vector(self, R: Any) -> Any:
+    def rotation_vector(self, R: Any, *, branches: bool = True) -> Any:
         """Rotation vector of a rotation, of a length of at most pi.
 
         By the half angle: its cosine s and its sine times the axis, v, from the largest of trace
-        and diagonal (S. W. Shepperd, J. Guidance and Control 1 (1978) 223).
+        and diagonal (S. W. Shepperd, J. Guidance and Control 1 (1978) 223). Without branches from
+        the trace alone: four times fewer operations, and digits are lost near half a turn.
         """
         if getattr(R, "shape", None) != (3, 3):
             shape = getattr(R, "shape", "that of a scalar or list")
@@ -56,6 +57,11 @@ class SmoothFunctions:
             return self._define(f"{label}_{name}", value)
 
         trace = named("trace", R[0, 0] + R[1, 1] + R[2, 2])
+        if not branches:
+            s, *v = (named(f"half_{k}", a) for k, a in enumerate(_by_trace(R, trace)))
+            z = named("ratio", sum(a**2 for a in v) / s**2)
+            factor = named("factor", 2 * _half_angle(z) / s)
+            return Matrix([a * factor for a in v])
         first = sp.And(R[0, 0] >= R[1, 1], R[0, 0] >= R[2, 2])
         conditions = (trace > 0, first, R[1, 1] >= R[2, 2], True)
         sides = [_by_trace(R, trace), *(_by_diagonal(R, trace, i) for i in range(3))]

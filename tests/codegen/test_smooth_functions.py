@@ -53,13 +53,13 @@ def test_sinc_and_cosc(tmp_path: Path) -> None:
                 assert abs(found - right) <= 2e-15 * abs(right), (size, first, order)
 
 
-def turning(name: str, *, tasks: bool = False) -> Definition:
+def turning(name: str, *, tasks: bool = False, branches: bool = True) -> Definition:
     """A vector that is turned, and the rotation vector of the rotation."""
     m = Model(name, nodes=1, rule=quadrature.point_rule())
     w = [m.unknown(f"w_{k}") for k in range(3)]
     (a,) = m.parameters(a="factor")
     R = m.define("R", m.rotation(w))
-    v = m.rotation_vector(R)
+    v = m.rotation_vector(R, branches=branches)
     x = R * sp.Matrix([1, 2, -1]) * a
     m.potential((x[0] * x[1] + x[2]) / 8 + sum(c**2 for c in v) / 2 + v[0] * v[1] / 4)
     m.fields(**{f"R_{k}": r for k, r in enumerate(R)}, **{f"v_{k}": c for k, c in enumerate(v)})
@@ -90,6 +90,19 @@ def test_two_derivatives(w: tuple[float, ...], kernel: Kernel) -> None:
     """At half a turn and beyond only the sign of the vector changes."""
     errors = tangent_errors(turning("turning"), kernel, (), w, parameters=[0.7])
     assert max(errors) < 3e-15
+
+
+def test_a_rotation_vector_without_branches(tmp_path: Path) -> None:
+    """Its digits go with the cosine of the half angle."""
+    kernel = compiled(turning("one_formula", branches=False), tmp_path)
+    axis = np.array([0.6, -0.64, 0.48])
+    for angle in (0.0, 1e-160, 1e-4, 1.0, 2.0, 2.6, 3.0):
+        at = np.zeros((1, 0)), (angle * axis)[None]
+        found = kernel.fields_at(*at, parameters=[1.0])[0, 0, 9:]
+        lost = 1 / np.cos(angle / 2) ** 2
+        assert np.abs(found - angle * axis).max() <= 2e-15 * lost * max(angle, 1e-300)
+    d = turning("one_formula", branches=False)
+    assert max(tangent_errors(d, kernel, (), (0.3, -0.2, 0.5), parameters=[0.7])) < 3e-15
 
 
 def test_a_large_rotation_vector(kernel: Kernel) -> None:

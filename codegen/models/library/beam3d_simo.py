@@ -38,7 +38,7 @@ def beam3d_simo() -> Definition:
     R = [m.rotation(sp.Matrix([c[k] for c in w])) for k in (0, 1)]
     turned = [m.define(f"R_{k}", R[k] * axes) for k in (0, 1)]
     # rotation from the first to the second section, in the axes of the first
-    spin = m.define("spin", m.rotation_vector(turned[0].T * turned[1]))
+    spin = m.define("spin", m.rotation_vector(turned[0].T * turned[1], branches=False))
     middle = m.define("middle", turned[0] * m.rotation(spin / 2))
     now = along + sp.Matrix([c[1] - c[0] for c in u])
     strain = m.define("strain", middle.T * now / length - sp.Matrix([1, 0, 0]))
