@@ -20,6 +20,7 @@ from softehl.cases.seal.cycle.motion import Motion, motion_keys
 from softehl.cases.seal.gland.messages import assumed, foreword, warnings
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import MIXED
+from softehl.cases.seal.gland.validation import require_films
 from softehl.cases.seal.report.model_limits import LEFT_OUT, cautions, titled
 from softehl.cases.seal.states.state import stage_label
 from softehl.cases.seal.states.summary import far, leaks
@@ -90,6 +91,7 @@ class Cycle(Seal):
             )
         if not self.path.speed.largest > 0.0 or not self.path.speed.values[0] > 0.0:
             raise ValueError("motion: the rod must begin with an outstroke, U > 0 at t = 0")
+        require_films(self, self.sealed_pressure)
         return self
 
     @property

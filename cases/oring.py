@@ -1,6 +1,7 @@
 """The reciprocating O-ring of section 5.1: Table 1 as one seal."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from math import isnan, nan
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -111,8 +112,8 @@ class ORingCase(Case[Seal, FilmRow]):
     def merits(self, parameters: Seal, rows: Sequence[FilmRow]) -> Mapping[str, float]:
         """See :class:`Case`; of all speeds the worst."""
         found = {
-            "largest friction [N]": max(abs(row.rod_friction_N) for row in rows),
-            _THINNEST: min(row.h_min_um for row in rows),
+            "largest friction [N]": _worst(abs(row.rod_friction_N) for row in rows),
+            _THINNEST: min(row.thickness_um for row in rows),
         }
         if nets := net_leakage(rows):
             volume = parameters.travel * max(net.net_mm3_per_mm for net in nets)
@@ -138,7 +139,7 @@ class ORingCase(Case[Seal, FilmRow]):
         """See :class:`Case`."""
         reservations = run_plan.reservations(rows, advice)
         doubts = [f"{text}: {self.named(some)}" for text, some in reservations.items()]
-        thin = [row for row in rows if not row.regime and row.h_min_um < run_plan.THIN]
+        thin = [row for row in rows if not row.regime and row.thickness_um < run_plan.THIN]
         if not thin:
             return doubts
         text = (
@@ -205,6 +206,12 @@ def run_oring(
     from softehl.cases.seal.solve.driver import run
 
     return run(parameters, observer, contacts, differentiation(parameters))
+
+
+def _worst(values: Iterable[float]) -> float:
+    """The largest of some values, nan if one is not known."""
+    numbers = list(values)
+    return nan if any(map(isnan, numbers)) else max(numbers)
 
 
 def _not_differentiated(rows: Sequence[FilmRow]) -> list[str]:

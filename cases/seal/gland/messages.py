@@ -59,8 +59,11 @@ def _in_service(p: Seal) -> Iterator[str]:
 def warnings(p: Seal, pressure: float) -> list[str]:
     """A pressure above what is known to run, keys without effect, what is unusual, a line each."""
     load, beyond = _load(p, pressure)
-    message = "the run may take minutes and end without a film; a harder rubber or a lower pressure"
-    first = [f"{load}; {message} helps"] if beyond else []
+    message = "the run may take minutes and end without a film"
+    if p.predictable and p.load_ratio(pressure) > HARDEST:
+        message = "friction is not known there"
+    message += "; a harder rubber or a lower pressure helps"
+    first = [f"{load}; {message}"] if beyond else []
     return [*first, *_unused(p), *_unusual(p), *handbook(p)]
 
 
@@ -71,7 +74,7 @@ def _load(p: Seal, pressure: float) -> tuple[str, bool]:
         limit = 3.0
         sample = (
             "in a sample of O-rings all films were found at ratios to 4, nine of ten at 4 to 5; "
-            "above 5 states are uncertain, and nothing was tried above 5.4"
+            "above 5 h* of instrokes is estimated by theory, above 8 that of outstrokes too"
         )
     else:
         limit = 2.0
@@ -82,6 +85,9 @@ def _load(p: Seal, pressure: float) -> tuple[str, bool]:
     message = f"sealed pressure / shear modulus = {ratio:.2g}: {sample} (docs/limits.md)"
     return message, ratio > limit
 
+
+HARDEST = 8.0
+"""Largest p_s / mu at which films are computed, those of outstrokes."""
 
 # --- warnings -----------------------------------------------------------------------------------
 

@@ -105,6 +105,11 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
         stiffness = self.asperity_stiffness or 4.0 * self.surface_modulus
         return SurfacePair.of(self.roughness, stiffness, self.boundary_friction)
 
+    @property
+    def predictable(self) -> bool:
+        """True if the theory of the inlet holds: one round lobe, a closed gap, a Newtonian oil."""
+        return self.round and not (self.opens or self.thins) and self.mesh == "graded"
+
     @model_validator(mode="after")
     def _nothing_contradicts(self) -> Self:
         require_consistent(self)

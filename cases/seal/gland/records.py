@@ -312,10 +312,15 @@ class Solid(FreeSeal, Rubber, Discretisation):
     materials: dict[str, Region] = key({}, "materials of regions of the section", bounds=MATERIALS)
 
     @property
+    def surface_rubber(self) -> Rubber:
+        """Rubber that the film is on."""
+        under = self._surface if self.mesh == "file" else CAP
+        return self.rubber(under if under in self.materials else "")
+
+    @property
     def surface_modulus(self) -> float:
         """Shear modulus of what the film is on [MPa]."""
-        under = self._surface if self.mesh == "file" else CAP
-        return self.rubber(under if under in self.materials else "").shear_modulus
+        return self.surface_rubber.shear_modulus
 
     @property
     def _surface(self) -> str:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from softehl.cases.seal.gland.parameters import Seal
 
 _MOST = 6.0
-"""Largest p_s / mu that is not refused: runs above it take minutes to `uncertain` states."""
+"""Largest p_s / mu of a film that must be computed: runs above it take minutes."""
 
 
 def require_consistent(p: Seal) -> None:
@@ -194,14 +194,20 @@ def _section_is_between_the_walls(p: Gland) -> None:
         )
 
 
-def _pressure_is_within_reach(p: Seal) -> None:
-    ratio = p.load_ratio(p.sealed_pressure)
+def require_films(p: Seal, pressure: float) -> None:
+    """ValueError if no film is found at a sealed pressure, MPa."""
+    ratio = p.load_ratio(pressure)
     if ratio > _MOST:
         raise ValueError(
-            f"sealed_pressure = {p.sealed_pressure:g} MPa is {ratio:.2g} times the shear modulus "
+            f"sealed_pressure = {pressure:g} MPa is {ratio:.2g} times the shear modulus "
             f"of the rubber; films are found up to {_MOST:g} times (docs/limits.md); take a harder "
             "rubber or a lower pressure"
         )
+
+
+def _pressure_is_within_reach(p: Seal) -> None:
+    if not p.predictable:
+        require_films(p, p.sealed_pressure)
 
 
 _CHECKS = (

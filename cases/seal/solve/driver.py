@@ -11,6 +11,7 @@ from softehl.cases.harness.observer import Observer, Outcome, StageRecord
 from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.surfaces import MICROMETRE
 from softehl.cases.seal.solve.adaptation import Adaptation, Adapted
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes, ContactStore
 from softehl.cases.seal.solve.contact_solver import ContactSolver
@@ -26,7 +27,9 @@ from softehl.cases.seal.states.contacts import (
     overlap,
     unsealed,
 )
-from softehl.cases.seal.states.estimate import reservation
+from softehl.cases.seal.states.estimate import Estimate, reservation
+from softehl.cases.seal.states.estimated import computed, contact_of, estimated_state
+from softehl.cases.seal.states.inlet_edges import predicted
 from softehl.cases.seal.states.results import film_state
 from softehl.cases.seal.states.run_plan import strokes_of
 from softehl.cases.seal.states.sensitivity_table import differentiable
@@ -41,6 +44,10 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear.direct import direct_solver
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Status
+
+COMPARED = 5.0
+"""Largest p_s / mu at which the estimate of the error alone makes a state `ok`: above, two meshes
+may agree on a wrong film, and the theory of the inlet must agree with them."""
 
 UNFIT = "no mesh was found that shows the film; use a finer mesh (larger density)"
 """Reservation against a film whose mesh does not fit it."""
@@ -80,10 +87,13 @@ class Judge:
         """The state of a film; faster: of the same stroke at the next higher speed, if there is."""
         film, estimate, p = adapted.film, adapted.estimate, adapted.film.system.parameters
         error = estimate.h_star if estimate else nan
+        theory = predicted(film.system, film.squeeze_film.dry, film.loads.stroke, film.loads.speed)
+        applies = theory is not None and theory.applies and not p.rough
         verdict = replace(
             replace(self.contact, last=faster).after(film.numbers),
             error=error if p.error_estimate and p.mesh == "graded" else None,
-            reservation=reservation(p, estimate) if adapted.fits else UNFIT,
+            reservation=_reservation(p, estimate, applies) if adapted.fits else UNFIT,
+            theory=theory.difference(film.numbers.h_star) if theory and applies else None,
         )
         friction_known = film.numbers.friction_known
         state = replace(
@@ -97,10 +107,24 @@ class Judge:
             ),
             h_star_error_percent=error,
             rod_friction_error_percent=estimate.friction if estimate and friction_known else nan,
+            h_star_theory_um=theory.h_star / MICROMETRE if theory else nan,
+            inlet_over_pocket=theory.over_pocket if theory else nan,
         )
         if self.differentiate and differentiable(state):
             state = replace(state, sensitivity=self.differentiate(film))
         return state
+
+
+def _reservation(p: Seal, estimate: Estimate | None, applies: bool) -> str:
+    """Why a film with a small estimated error is not `ok`; applies: if the theory was asked."""
+    ratio = p.load_ratio(p.sealed_pressure)
+    if ratio > COMPARED and not applies:
+        return (
+            f"sealed pressure / shear modulus = {ratio:.2g} is above {COMPARED:g}, where two "
+            "meshes may agree on a wrong film, and the theory of the inlet does not apply; use a "
+            "harder rubber or a lower pressure"
+        )
+    return reservation(p, estimate)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +189,7 @@ def run(
     differentiate: makes the sensitivities of a film, where they are asked for.
     """
     try:
-        contact = DryContact.of(parameters, observer, contacts)
+        contact = DryContact.of(contact_of(parameters), observer, contacts)
     except StageError as failed:  # the size of the problem alone is reported
         failures = [explained(failed, parameters)]
         return _outcome(build_system(parameters), failed.records, [], failures)
@@ -175,9 +199,16 @@ def run(
     for stroke in strokes_of(parameters):
         last, missed = list[Adapted](), list[NoFilm]()
         for speed in parameters.speeds:
-            result = contact.adapted(stroke, speed, last[-2:])
-            if isinstance(result, NoFilm):
-                missed.append(result)
+            result = None
+            if computed(parameters, stroke):
+                result = contact.adapted(stroke, speed, last[-2:])
+            if not isinstance(result, Adapted):
+                state = estimated_state(parameters, contact.system, contact.x, stroke, speed)
+                if state is not None:
+                    states.append(state)
+                    report_film(observer, state)
+                elif result is not None:
+                    missed.append(result)
                 continue
             states.append(judge.state(result, last[-1].film.numbers if last else None))
             report_film(observer, states[-1])

@@ -119,13 +119,17 @@ def contact_state(system: SealSystem, x: Array) -> ContactState:
 
 def contact_pressure(system: SealSystem, sealed_pressure: float, x: Array) -> Array:
     """True pressure (arc nodes,): multipliers per current area, plus p_s where it acts, MPa."""
-    mesh = system.mesh
-    current = tributary_areas(system.deformed(x), mesh.arc_segments, mesh.arc_nodes)
-    multipliers = np.minimum(system.rod_multipliers(x), 0.0)
-    pressure = -multipliers * system.rod_areas / current
+    pressure = excess_pressure(system, x)
     pressure[: system.section.lowest] += sealed_pressure
     pressure[system.section.lowest] += 0.5 * sealed_pressure  # the pressure ends at this node
     return np.asarray(pressure)
+
+
+def excess_pressure(system: SealSystem, x: Array) -> Array:
+    """Multipliers per current area (arc nodes,), MPa: the pressure in excess of that of the oil."""
+    mesh = system.mesh
+    current = tributary_areas(system.deformed(x), mesh.arc_segments, mesh.arc_nodes)
+    return np.asarray(-np.minimum(system.rod_multipliers(x), 0.0) * system.rod_areas / current)
 
 
 def unsealed(system: SealSystem, x: Array) -> str:

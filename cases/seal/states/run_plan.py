@@ -6,7 +6,14 @@ from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import DENSITIES, Discretisation, Duty
 from softehl.cases.seal.gland.surfaces import FULL
-from softehl.cases.seal.states.state import CLIPPED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
+from softehl.cases.seal.states.state import (
+    CLIPPED,
+    ESTIMATED,
+    OSCILLATING,
+    UNCERTAIN,
+    UNDER_RESOLVED,
+    FilmRow,
+)
 from softehl.cases.seal.states.verdict import DOUBTFUL, FINER
 
 SIGNS: dict[Stroke, float] = {"out": 1.0, "in": -1.0}
@@ -22,21 +29,26 @@ DOUBTS = {
     UNDER_RESOLVED: f"the inlet is too short for this mesh, h* may be far off; {FINER}",
     CLIPPED: "the arc ends within the film, h* may be far off",
     UNCERTAIN: DOUBTFUL,
+    ESTIMATED: "no film was computed: h* is that of the theory of the inlet, friction is not known",
     OSCILLATING: f"the film zigzags from node to node; h* is right, the profile is not; {FINER}",
 }
 """Verdict of a state that is kept but is not ok -> what is to be known of it."""
 
 
+SPECIFIC = CLIPPED, UNCERTAIN, ESTIMATED
+"""Verdicts of which each state says more."""
+
+
 def reservations(rows: Sequence[FilmRow], advice: Mapping[float, str]) -> dict[str, list[FilmRow]]:
     """Advice for states that are not ok -> these states, worst first.
 
-    advice: what states came with, by U: why one is clipped or uncertain, other than by its error.
+    advice: what states came with, by U: why one has a verdict of SPECIFIC, if not by its error.
     """
     rows_by_reservation: dict[str, list[FilmRow]] = {}
     for word in DOUBTS:
         for row in rows:
             if row.verdict == word:
-                specific = advice.get(row.key) if word in (CLIPPED, UNCERTAIN) else None
+                specific = advice.get(row.key) if word in SPECIFIC else None
                 rows_by_reservation.setdefault(f"{word}: {specific or DOUBTS[word]}", []).append(
                     row
                 )
@@ -86,7 +98,12 @@ def missing_speeds(parameters: Seal, stroke: Stroke, rows: Sequence[FilmRow]) ->
     They have no row, or one of a coarser mesh that does not meet the tolerance.
     """
     outside = {row.key for row in outside_tolerance(parameters, rows)}
-    solved = {r.key for r in rows if not (r.key in outside and r.density < parameters.density)}
+    again = {
+        r.key
+        for r in rows
+        if r.key in outside and r.density < parameters.density and r.verdict != ESTIMATED
+    }
+    solved = {r.key for r in rows} - again
     return tuple(u for u in parameters.speeds if SIGNS[stroke] * u not in solved)
 
 

@@ -23,10 +23,13 @@ CLIPPED = "clipped"
 UNCERTAIN = "uncertain"
 """Verdict of a state whose estimated error is too large, or is not known though it was wanted, or
 is small where two meshes do not show it."""
+ESTIMATED = "estimated"
+"""Verdict of a state of which no film is computed: h* by the theory of the inlet, friction
+unknown."""
 OSCILLATING = "oscillating"
 """Verdict of a state whose film zigzags from node to node: h* is sound, the profile is not."""
 
-VERDICTS = (COLLAPSED, UNDER_RESOLVED, CLIPPED, UNCERTAIN, OSCILLATING, OK)
+VERDICTS = (COLLAPSED, UNDER_RESOLVED, CLIPPED, UNCERTAIN, ESTIMATED, OSCILLATING, OK)
 """Verdicts of states, the worst first."""
 
 Section = Cells
@@ -169,12 +172,21 @@ class FilmRow(Row):
     entrance_pressure_MPa: float = column(
         "MPa", "built up before the arc, where that begins within the film; else 0", default=0.0
     )
+    h_star_theory_um: float = column(
+        "um", "h* by the theory of the inlet; nan where it does not hold", default=nan
+    )
+    inlet_over_pocket: float = column(
+        "",
+        "length of the inlet over the pocket of oil before it; the theory applies up to 0.1",
+        default=nan,
+    )
     density: int = column(
         "", "density of the mesh of the state: above that of the run where its error was too large"
     )
     verdict: str = column(
         "",
-        "`ok`, `oscillating`, `uncertain`, `clipped` or `under-resolved`; `collapsed` is no result",
+        "`ok`, `oscillating`, `estimated`, `uncertain`, `clipped` or `under-resolved`; `collapsed` "
+        "is no result",
     )
 
     @property
@@ -198,6 +210,11 @@ class FilmRow(Row):
         point = f"p_s = {self.sealed_pressure_MPa:g} MPa, U = {self.rod_speed_mm_s:+g} mm/s"
         value = f"h* = {self.h_star_um:.4g} um" if self.usable else f"{self.verdict}: not a result"
         return f"{point}: {value}"
+
+    @property
+    def thickness_um(self) -> float:
+        """Least film thickness, um; h* of a state whose film is not computed."""
+        return self.h_star_um if self.verdict == ESTIMATED else self.h_min_um
 
     @property
     def stroke(self) -> str:

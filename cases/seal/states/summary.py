@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 
 from softehl.cases.harness.case import Alarm
 from softehl.cases.harness.row import OK
@@ -11,7 +12,7 @@ from softehl.cases.seal.gland.surfaces import MIXED
 from softehl.cases.seal.gland.trade.service_names import service_cycles
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage, per_100_m
 from softehl.cases.seal.states.run_plan import USUAL
-from softehl.cases.seal.states.state import FilmRow
+from softehl.cases.seal.states.state import ESTIMATED, FilmRow
 from softehl.cases.seal.states.verdict import LARGEST_ERROR
 
 RETURNS = "returns what it takes out"
@@ -101,7 +102,7 @@ def _whether(speeds: Sequence[_Speed], travel: float) -> str:
 def _line(speed: _Speed, travel: float, stroke: str, service: str | None) -> str:
     """A speed: leakage, friction, least lambda."""
     strokes = speed.strokes
-    forces = [f"{abs(row.rod_friction_N):.3g} N {stroke}" for stroke, row in strokes.items()]
+    forces = [f"{_force(row)} {stroke}" for stroke, row in strokes.items()]
     parts = [f"friction {', '.join(forces)}", *_ratio(strokes)]
     if speed.net is not None or stroke == "both":
         parts.insert(0, _leakage(speed, travel, service))
@@ -111,6 +112,11 @@ def _line(speed: _Speed, travel: float, stroke: str, service: str | None) -> str
     doubt = f" ({', '.join(reservations)})" if reservations else ""
     line, thin = f"  {speed.speed:g} mm/s: {'; '.join(parts)}{doubt}", _thin(strokes)
     return Alarm(f"{line}; {thin}") if thin else line
+
+
+def _force(row: FilmRow) -> str:
+    """The friction of a row in words."""
+    return f"{abs(row.rod_friction_N):.3g} N" if isfinite(row.rod_friction_N) else "not known"
 
 
 def _leakage(speed: _Speed, travel: float, service: str | None) -> str:
@@ -127,7 +133,10 @@ def _leakage(speed: _Speed, travel: float, service: str | None) -> str:
         return f"{RETURNS} ({both})"
     volume = travel * net.net_mm3_per_mm
     period = 2.0 * travel / net.speed_mm_s
-    return f"{leaks(volume)} ({both}), {far(volume, travel, service, period)}"
+    words = f"{leaks(volume)} ({both}), {far(volume, travel, service, period)}"
+    if net.verdict == ESTIMATED:
+        words += f", within {net.net_error_percent:.2g} %"
+    return words
 
 
 def _ratio(strokes: Mapping[str, FilmRow]) -> Iterator[str]:
@@ -141,7 +150,7 @@ def _ratio(strokes: Mapping[str, FilmRow]) -> Iterator[str]:
 def _thin(strokes: Mapping[str, FilmRow]) -> str:
     """Which films are thinner than the roughness of the surfaces, in words."""
     rough = [s for s, row in strokes.items() if row.regime and row.lambda_ratio < MIXED]
-    smooth = [s for s, row in strokes.items() if not row.regime and row.h_min_um < USUAL]
+    smooth = [s for s, row in strokes.items() if not row.regime and row.thickness_um < USUAL]
     if rough:
         return f"film below the roughness of the surfaces: {_named(rough)}"
     if smooth:

@@ -95,6 +95,30 @@ def _modulus(energy: str, values: tuple[tuple[str, float], ...]) -> float:
     return float(K[0, 0, 0]) / 4.0
 
 
+def incremental_stiffness(
+    material: Material, values: Values, along: float, hoop: float
+) -> tuple[float, float]:
+    """Stress difference of a stretched rubber, and its derivative by the first strain, MPa.
+
+    Parameters
+    ----------
+    material : Material
+        The rubber.
+    values : mapping
+        Parameters of its kernel.
+    along, hoop : float
+        Principal logarithmic strains; the third follows, as the volume does not change.
+
+    Returns
+    -------
+    (float, float)
+        True stress along minus that of the third direction, and its derivative by `along`.
+    """
+    e = np.array([[along, hoop]])
+    R, K = material.sheet.tangent(np.ones((1, 2)), e, parameters=dict(values))
+    return float(R[0, 0]), float(K[0, 0, 0])
+
+
 # --- tests of a rubber ------------------------------------------------------------------------
 
 SECOND = {"uniaxial": -0.5, "biaxial": 1.0, "shear": 0.0}

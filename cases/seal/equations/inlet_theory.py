@@ -1,0 +1,212 @@
+"""Theory of the inlet: h* from the edge of the dry contact alone (docs/method.md).
+
+Near an edge the dry pressure is p = K sqrt(s)(1 + b s), and the gap beyond it (4/3)(K / E*) d^1.5
+of a half-space with the modulus E*. Viscous and elastic forces balance over the length l. In the
+scales l, K sqrt(l), K l^1.5 / E* one problem is left, with a pressure P(X) and a film H(X):
+
+    H' = -(2/pi) PV int P(S) / (X - S) dS,    P' = -exp(A P) (H - H*) / H^3,
+
+P -> sqrt(-X)(1 + B X) inside, with A = alpha K sqrt(l) and B = b l. It has a solution for one H*
+(Snoeijer, Eggers, Venner: Phys. Fluids 25, 101705, 2013). `local_inlet` solves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import exp, log
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+
+CONSTANT = 0.51212
+"""H* at A = B = 0, by `local_inlet` with 777 nodes; with 186 nodes 0.5120."""
+
+BY_VISCOSITY, BY_CURVATURE = 0.345, -0.86
+"""Derivatives of ln H* by A and by B, by differences of `local_inlet`."""
+
+FACTOR = CONSTANT * 6.0**0.6
+"""Constant 1.5006 of h* = 1.5006 (eta U)^0.6 E*^0.2 K^-0.8."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Edge of a dry contact where a film is drawn in.
+
+    Attributes
+    ----------
+    rise : float
+        K^2 of the pressure in excess of that of the oil, MPa^2/mm.
+    curvature : float
+        b of this pressure, 1/mm.
+    modulus : float
+        E* of the stretched rubber, MPa.
+    pocket : float
+        Axial distance to the end of the section, where the gap ends, mm.
+    """
+
+    rise: float
+    curvature: float
+    modulus: float
+    pocket: float
+
+    def length(self, flow: float) -> float:
+        """Length l = (6 eta U E*^2 / K^3)^(2/5) of the inlet, mm; flow: eta U, MPa mm."""
+        return float((6.0 * flow * self.modulus**2 / self.rise**1.5) ** 0.4)
+
+    def h_star(self, flow: float, alpha: float = 0.0) -> float:
+        """Film thickness h*, mm.
+
+        Parameters
+        ----------
+        flow : float
+            eta |U| with the viscosity at the pressure before the inlet, MPa mm.
+        alpha : float
+            Pressure-viscosity coefficient, 1/MPa.
+        """
+        length = self.length(flow)
+        viscosity, curvature = alpha * (self.rise * length) ** 0.5, self.curvature * length
+        plain = FACTOR * flow**0.6 * self.modulus**0.2 * self.rise**-0.4
+        return float(plain * (1.0 + BY_VISCOSITY * viscosity) * (1.0 + BY_CURVATURE * curvature))
+
+
+# --- the stretched rubber -----------------------------------------------------------------------
+
+Stiffness = Callable[[float, float], tuple[float, float]]
+"""Principal logarithmic strains (along the surface, hoop) of an incompressible rubber -> difference
+of the true stresses along and across the surface, and its derivative by the first strain, MPa."""
+
+
+def incremental_modulus(stiffness: Stiffness, along: float, hoop: float) -> float:
+    """E* of a half-space with two stretches, the third by incompressibility, MPa; 4 mu at rest.
+
+    Small loads on a stretched half-space, in plane strain (Biot: Mechanics of incremental
+    deformations, 1965; Dowaikh, Ogden: IMA J. Appl. Math. 44, 261, 1990). With the moduli alpha,
+    beta, gamma of the latter, P = sqrt(alpha/gamma) and S^2 = 2 beta/gamma + 2 P:
+
+        E* = 2 gamma (P S^2 - (1 - P)^2) / S.
+
+    The pressure of the oil on the surface drops out.
+    """
+    across = 1.0 / (along * hoop)
+    difference, slope = stiffness(log(along), log(hoop))
+    gap = along**2 - across**2
+    ratio = slope / (4.0 * across**2) if abs(gap) < 1e-6 * across**2 else difference / gap
+    gamma, P = ratio * across**2, along / across
+    twice_beta = slope + difference - 2.0 * ratio * along**2
+    S = (twice_beta / gamma + 2.0 * P) ** 0.5
+    return float(2.0 * gamma * (P * S**2 - (1.0 - P) ** 2) / S)
+
+
+# --- the local problem --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class LocalInlet:
+    """Solution of the local problem: X, P, H (n,), and H*; X < 0 is inside the contact."""
+
+    X: Array
+    P: Array
+    H: Array
+    H_star: float
+
+
+def local_inlet(
+    A: float = 0.0,
+    B: float = 0.0,
+    inside: float = 300.0,
+    outside: float = 100.0,
+    spacing: tuple[float, float] = (0.05, 0.06),
+) -> LocalInlet:
+    """Solve the local problem by Newton's method; pressures are linear between nodes.
+
+    Parameters
+    ----------
+    A, B : float
+        Pressure-viscosity alpha K sqrt(l) and curvature b l.
+    inside, outside : float
+        Ends of the mesh, in l; beyond the inner one the pressure is that of the dry contact.
+    spacing : (float, float)
+        Segment at X = 0, and growth with the distance.
+
+    Raises
+    ------
+    ArithmeticError
+        If Newton's method does not converge.
+    """
+    X = np.r_[-_spaced(inside, *spacing)[::-1], _spaced(outside, *spacing)[1:]]
+    n, dX, X_mid = len(X), np.diff(X), 0.5 * (X[1:] + X[:-1])
+    kernel = 2.0 / np.pi * _hilbert(X, X_mid)
+    tail = 2.0 / np.pi * (_tail(X_mid, inside) + B * _curved_tail(X_mid, inside))
+    far, rise = inside**0.5 * (1.0 + B * inside), (1.0 + 3.0 * B * inside) / (2.0 * inside**0.5)
+    thin = exp(-A * far) * rise
+    k = np.arange(n - 1)
+    dry = np.sqrt(np.maximum(-X, 0.0))
+    unknowns = np.r_[dry, 4.0 / 3.0 * np.maximum(X, 0.0) ** 1.5 + CONSTANT, CONSTANT]
+    for _ in range(60):
+        P, H, H_star = unknowns[:n], unknowns[n : 2 * n], unknowns[-1]
+        H_mid = 0.5 * (H[1:] + H[:-1])
+        viscosity = np.exp(A * np.minimum(0.5 * (P[1:] + P[:-1]), far))
+        slope = viscosity * (H_mid - H_star) / H_mid**3
+        by_H = 0.5 * viscosity * (1.0 / H_mid**3 - 3.0 * (H_mid - H_star) / H_mid**4)
+        residual = np.r_[
+            np.diff(H) / dX + kernel @ P + tail,
+            np.diff(P) / dX + slope,
+            P[-1],
+            H[0] - H_star - H_star**3 * thin,
+            P[0] - far,
+        ]
+        J = np.zeros((2 * n + 1, 2 * n + 1))
+        J[: n - 1, :n] = kernel
+        J[k, n + k] -= 1.0 / dX
+        J[k, n + k + 1] += 1.0 / dX
+        J[n - 1 + k, k] = 0.5 * A * slope - 1.0 / dX
+        J[n - 1 + k, k + 1] = 0.5 * A * slope + 1.0 / dX
+        J[n - 1 + k, n + k] = J[n - 1 + k, n + k + 1] = by_H
+        J[n - 1 + k, -1] = -viscosity / H_mid**3
+        J[2 * n - 2, n - 1] = J[2 * n - 1, n] = J[2 * n, 0] = 1.0
+        J[2 * n - 1, -1] = -1.0 - 3.0 * H_star**2 * thin
+        step = np.linalg.solve(J, -residual)
+        falls = step[n:] < 0.0
+        limit = 0.7 * np.min(-unknowns[n:][falls] / step[n:][falls], initial=np.inf)
+        unknowns = unknowns + min(1.0, limit) * step
+        if limit >= 1.0 and np.abs(step).max() < 1e-9:
+            return LocalInlet(X, unknowns[:n], unknowns[n : 2 * n], float(unknowns[-1]))
+    raise ArithmeticError(f"the local problem of the inlet has no solution at A = {A:g}, B = {B:g}")
+
+
+def _spaced(length: float, first: float, growth: float) -> Array:
+    """Places from 0 to a length, in segments that grow."""
+    places = [0.0]
+    while places[-1] < length:
+        places.append(places[-1] + first + growth * places[-1])
+    return np.array(places) * length / places[-1]
+
+
+def _hilbert(X: Array, at: Array) -> Array:
+    """Matrix (m, n) of PV int P(S) / (x - S) dS at x, with P linear between its nodes X."""
+    a, b, x = X[None, :-1], X[None, 1:], at[:, None]
+    d, logarithm = b - a, np.log(np.abs((x - a) / (x - b)))
+    matrix = np.zeros((len(at), len(X)))
+    matrix[:, :-1] += (d + (b - x) * logarithm) / d
+    matrix[:, 1:] += (-d + (x - a) * logarithm) / d
+    return matrix
+
+
+def _tail(x: Array, L: float) -> Array:
+    """Integral of sqrt(-S) / (x - S) from minus infinity to -L, less its infinite constant."""
+    y, r, root = np.sqrt(np.abs(x)), L**0.5, 2.0 * L**0.5
+    with np.errstate(divide="ignore", invalid="ignore"):
+        outside = -root + 2.0 * y * (np.arctan(r / y) - 0.5 * np.pi)
+        within = -root + y * np.log((r + y) / (r - y))
+    return np.asarray(np.where(x > 0.0, outside, within))
+
+
+def _curved_tail(x: Array, L: float) -> Array:
+    """Integral of (-S)^1.5 / (x - S) from minus infinity to -L, less its infinite parts."""
+    y, r = np.sqrt(np.abs(x)), L**0.5
+    with np.errstate(divide="ignore", invalid="ignore"):
+        outside = np.pi * y**3 - 2.0 / 3.0 * r**3 + 2.0 * x * r - 2.0 * y**3 * np.arctan(r / y)
+        within = -(2.0 / 3.0 * r**3 - x * (2.0 * r - y * np.log((r + y) / (r - y))))
+    return np.asarray(np.where(x > 0.0, outside, within))
