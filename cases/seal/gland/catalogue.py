@@ -10,7 +10,8 @@ diameters.
 size less a constant is the inside diameter, or it stands behind the size. P, G and V are those of
 JIS B 2401-1, with the tolerances of their sections and, of P and G, the grooves of cylinders of JIS
 B 2401-2 (without back-up rings). S is the slim series of Japanese makers, not that of JIS B 2401-1
-of 2012. R is the French series, by makers' lists, from R8 on; R28 to R52 are AS568-325 to -349.
+of 2012. R is the French series from R8 on; R28 to R52 are AS568-325 to -349. Of these series single
+rows alone were compared with another list.
 """
 
 from __future__ import annotations
