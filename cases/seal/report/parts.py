@@ -124,7 +124,8 @@ def _friction(runs: Sequence[FinishedRun]) -> Part:
     if _several_speeds(runs):
         return Part("Friction", text, plots=[friction_plot(runs)])
     lines = [
-        f"{run.name}, {style.STROKES[row.stroke]}: {abs(row.rod_friction_N):.4g} N"
+        f"{run.name}, {style.STROKES[row.stroke]}: "
+        + (f"{abs(row.rod_friction_N):.4g} N" if isfinite(row.rod_friction_N) else "not known")
         for run in runs
         for row in run.rows
     ]

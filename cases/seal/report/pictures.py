@@ -214,8 +214,11 @@ def crossing(p: Oil, rows: Sequence[FilmRow], ratio: float) -> float | None:
 
 
 def stribeck_figure(p: Seal, rows: Sequence[FilmRow]) -> Figure | None:
-    """Friction of both strokes and the shares of asperities; None for smooth ones or one speed."""
-    rough = [row for row in rows if row.regime]
+    """Friction of both strokes and the shares of asperities.
+
+    None for smooth surfaces, and where fewer than two speeds have a friction that is known.
+    """
+    rough = [row for row in rows if row.regime and np.isfinite(row.rod_friction_N)]
     if len({abs(row.rod_speed_mm_s) for row in rough}) < 2:
         return None
     figure = Figure(figsize=(5.4, 5.6))

@@ -63,4 +63,4 @@ def position_range(rows: Sequence[FilmRow]) -> tuple[float, float]:
 
 def thicknesses(rows: Sequence[FilmRow]) -> tuple[float, float]:
     """Range of h that shows the thin part of all films, um."""
-    return 0.7 * min(row.h_min_um for row in rows), 20.0 * max(row.h_star_um for row in rows)
+    return 0.7 * min(row.thickness_um for row in rows), 20.0 * max(row.h_star_um for row in rows)

@@ -49,7 +49,7 @@ def contact_of(p: Seal) -> Seal:
     ratio = p.load_ratio(p.sealed_pressure)
     if not p.predictable or ratio <= max(FILMS.values()):
         return p
-    pressure = CONTACT * p.sealed_pressure / ratio
+    pressure = float(f"{CONTACT * p.sealed_pressure / ratio:.3g}")
     return p.model_copy(update={"sealed_pressure": pressure})
 
 
