@@ -25,7 +25,9 @@ from softehl.cases.seal.gland.rubbers.materials import (
 from softehl.cases.seal.gland.validation import require_films
 from softehl.cases.seal.report.pictures import stribeck_figure
 from softehl.cases.seal.report.profiles import thicknesses
+from softehl.cases.seal.solve.contact_meshes import misplacement
 from softehl.cases.seal.solve.driver import COMPARED, DryContact, _reservation, run
+from softehl.cases.seal.states.contacts import contact_edges
 from softehl.cases.seal.states.estimated import FILMS, contact_of, estimated_state
 from softehl.cases.seal.states.inlet_edges import predicted
 from softehl.cases.seal.states.leakage import net_leakage
@@ -164,6 +166,16 @@ def test_estimated_states() -> None:
     assert stribeck_figure(rough, [state, replace(state, rod_speed_mm_s=-50.0)]) is None
     assert np.isfinite(thicknesses(rows)).all()
     assert state.regime
+
+
+def test_misplaced_segments_are_seen() -> None:
+    graded = DryContact.of(Seal(density=1), Silent())
+    uniform = DryContact.of(Seal(density=1, mesh="uniform"), Silent())
+    equal = misplacement(uniform.system, uniform.x)
+    steep, flat = sorted((e.rise for e in contact_edges(uniform.system, uniform.x)), reverse=True)
+    assert misplacement(graded.system, graded.x) >= 1.0
+    assert 1.0 <= equal < 1.1  # no segment is longer than the finest one
+    assert steep > flat
 
 
 def test_a_contact_above_all_films_is_that_under_less_pressure() -> None:
