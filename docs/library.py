@@ -44,6 +44,13 @@ print(f"sway {study.solve().at((0, 3000))['u_x']:.2f} mm")
 sway 1.74 mm
 ```
 
+![A slit ring lifted by a line force](pictures/library_slit_ring.png)
+![A hemisphere pinched by two pairs of forces](pictures/library_hemisphere.png)
+![A bar twisted until it yields](pictures/library_bar.png)
+
+*Made by `result.plot(field, deformed=True, file=...)`: `shell_mitc4`, a slit ring
+(deflection) and a hemisphere under F = 400 (u_x); `hencky_j2`, a bar twisted by a rigid end (von Mises stress).*
+
 """
 
 

@@ -353,11 +353,9 @@ def hemisphere_path(n: int = 32) -> Array:
 
 
 @cache
-def slit_plate_path(radial: int = 10, around: int = 80) -> Array:
-    """Parts of the line force of 0.8, and the deflections of the inner and the outer corner.
-
-    A ring of radii 6 and 10 is slit along the x axis, clamped on one side of it and lifted on the
-    other.
+def slit_plate(radial: int, around: int) -> tuple[Study, Array]:
+    """A ring of radii 6 and 10, slit along the x axis, clamped on one side of it and lifted on the
+    other by a line force of 0.8; and the inner and the outer corner that are lifted.
     """
     flat = Mesh.rectangle(1.0, 1.0, cells=(around, radial))
     a, r = 2 * np.pi * flat.points[:, 0], 6 + 4 * flat.points[:, 1]
@@ -367,7 +365,12 @@ def slit_plate_path(radial: int = 10, around: int = 80) -> Array:
     study.fix("left", u_x=0, u_y=0, u_z=0, theta_1=0, theta_2=0)
     study.load("right", u_z=0.8)
     end = flat.nodes("right")
-    corners = end[np.argsort(r[end])[[0, -1]]]
+    return study, end[np.argsort(r[end])[[0, -1]]]
+
+
+def slit_plate_path(radial: int = 10, around: int = 80) -> Array:
+    """Parts of the line force, and the deflections of the inner and the outer corner."""
+    study, corners = slit_plate(radial, around)
     rows: list[list[float]] = []
     study.solve(steps=40, on_step=lambda s: rows.append([s.t, *s.values("u_z")[corners]]))
     return np.array(rows)

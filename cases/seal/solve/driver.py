@@ -207,7 +207,7 @@ def run(
                 if state is not None:
                     states.append(state)
                     report_film(observer, state)
-                elif result is not None:
+                if result is not None:  # a film was sought, and its failure is not lost
                     missed.append(result)
                 continue
             states.append(judge.state(result, last[-1].film.numbers if last else None))
