@@ -49,7 +49,8 @@ sway 1.74 mm
 ![A bar twisted until it yields](pictures/library_bar.png)
 
 *Made by `result.plot(field, deformed=True, file=...)`: `shell_mitc4`, a slit ring
-(deflection) and a hemisphere under F = 400 (u_x); `hencky_j2`, a bar twisted by a rigid end (von Mises stress).*
+(deflection) and a hemisphere under F = 400 (u_x); `hencky_j2`, a bar twisted by a rigid end (von
+Mises stress).*
 
 """
 
