@@ -37,7 +37,7 @@ ORDER = {
     ),
     "runtime": (
         *("arrays io mpi suggestions", "kernels", "mesh", "solve", "discretisation", "contact"),
-        *("definition", "equations", "sensitivity", "results", "parallel"),
+        *("definition", "equations", "sensitivity", "results", "device", "parallel"),
         *("analyses", "fit", "study"),
     ),
     "cases": ("harness", "seal", "oring slider cycle", "paper", "shipped", "app", "cli document"),

@@ -15,7 +15,7 @@ from softehl.codegen.emit.device import header
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import cache_dir
 from softehl.codegen.tools.page_evaluation import definition_of
-from softehl.runtime.device.device_source import DeviceSource
+from softehl.device_source import DeviceSource
 
 FLAGS = ("-O2", "-march=native", "-std=c++17", "-shared", "-fPIC", "-w")
 
@@ -68,7 +68,7 @@ def emulated_library(source: DeviceSource, fibers: bool = False) -> Path:
         (folder / name).write_text(text, encoding="utf-8")
     made = folder / f"kernels-{os.getpid()}.so"
     command += ["-x", "c++", str(folder / next(iter(source.files))), "-o", str(made)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False)
     if done.returncode:
         raise BuildError(f"{' '.join(command)} failed: {done.stderr.strip()[:2000]}")
     made.replace(library)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.device import device_source
+from softehl.runtime.device import device_printer
 from softehl.runtime.device.device_module import DeviceModule, device_module
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.matrix_free_products import (
@@ -25,7 +25,7 @@ from softehl.runtime.mesh.cells import CELLS
 def load_module(kernel: Kernel, device: str, real: str = "double") -> DeviceModule:
     """Device kernels of a kernel.  Raises DeviceError, `TargetError`."""
     directory = kernel.library.directory
-    return device_module(device_source.device_source(directory, kernel.name, real), device)
+    return device_module(device_printer.device_source(directory, kernel.name, real), device)
 
 
 @dataclass(eq=False)

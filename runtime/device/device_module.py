@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
+from softehl.device_source import DeviceSource
 from softehl.errors import SoftehlError
-from softehl.runtime.device import device_source
-from softehl.runtime.device.device_source import DeviceSource
+from softehl.runtime.device import device_printer
 
 DEVICES = ("cuda", "emulated")
 
@@ -64,7 +64,7 @@ class EmulatedModule(DeviceModule):
     def __init__(self, source: DeviceSource, *, fibers: bool = False) -> None:
         super().__init__(source, np)
         self._fibers = fibers
-        self._library = ctypes.CDLL(str(device_source.emulated_library(source, fibers)))
+        self._library = ctypes.CDLL(str(device_printer.emulated_library(source, fibers)))
 
     def launch(
         self, kernel: str, n: int, arrays: Sequence[Any], *, backwards: bool = False

@@ -522,20 +522,21 @@ def _evaluate_page(
 
 page_evaluator.evaluate_page = _evaluate_page
 
-from softehl.runtime.device import device_source  # noqa: E402
+from softehl.device_source import DeviceSource  # noqa: E402
+from softehl.runtime.device import device_printer  # noqa: E402
 
 
-def _device_source(folder: Path, kernel: str, real: str) -> device_source.DeviceSource:
+def _device_source(folder: Path, kernel: str, real: str) -> DeviceSource:
     with with_sympy():
         from softehl.codegen.tools import device_library
     return device_library.source_of(folder, kernel, real)
 
 
-def _emulated_library(source: device_source.DeviceSource, fibers: bool) -> Path:
+def _emulated_library(source: DeviceSource, fibers: bool) -> Path:
     with with_sympy():
         from softehl.codegen.tools import device_library
     return device_library.emulated_library(source, fibers)
 
 
-device_source.device_source = _device_source
-device_source.emulated_library = _emulated_library
+device_printer.device_source = _device_source
+device_printer.emulated_library = _emulated_library

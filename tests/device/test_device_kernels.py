@@ -15,10 +15,10 @@ from scipy.sparse import csr_array
 import softehl
 from benchmarks.field_pages import MATERIALS
 from softehl import Mesh, Study
+from softehl.device_source import DeviceSource
 from softehl.runtime.arrays import Array
 from softehl.runtime.device.device_block import DeviceBlock, SparsePattern, load_module
 from softehl.runtime.device.device_module import EmulatedModule
-from softehl.runtime.device.device_source import DeviceSource
 from softehl.runtime.discretisation.matrix_free_products import by_components, lexicographic
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.mesh.cells import CELLS

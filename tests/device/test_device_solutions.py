@@ -10,9 +10,9 @@ import pytest
 
 import softehl
 from softehl import Mesh, Study
+from softehl.device_source import DeviceSource
 from softehl.runtime.device import device_block
 from softehl.runtime.device.device_module import EmulatedModule
-from softehl.runtime.device.device_source import DeviceSource
 from softehl.runtime.study import StudyError
 from tests.device.test_device_kernels import GIVEN, page
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from softehl.codegen.tools.device_library import device_source
+from softehl.device_source import DeviceSource
 from softehl.runtime.device.device_module import OPTIONS
-from softehl.runtime.device.device_source import DeviceSource
 from tests.device.test_device_kernels import page
 
 

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from softehl import Mesh, Result, Study
-from softehl.runtime.arrays import Array, Flags
+from softehl.runtime.arrays import Array, Flags, Integers
 from tests.library.benchmark import Benchmark, Convergence
 
 BENCHMARKS: list[Benchmark] = []
@@ -353,7 +353,7 @@ def hemisphere_path(n: int = 32) -> Array:
 
 
 @cache
-def slit_plate(radial: int, around: int) -> tuple[Study, Array]:
+def slit_plate(radial: int, around: int) -> tuple[Study, Integers]:
     """A ring of radii 6 and 10, slit along the x axis, clamped on one side of it and lifted on the
     other by a line force of 0.8; and the inner and the outer corner that are lifted.
     """

@@ -1,13 +1,8 @@
-"""Device kernels of a page, as text with their sizes; `softehl` sets the function that prints them.
-
-The runtime has no compiler of pages.
-"""
+"""Device kernels of a page, as text with their sizes: what the compiler gives to the runtime."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Protocol
 
 
 @dataclass(frozen=True)
@@ -50,24 +45,3 @@ class DeviceSource:
     def blocks(self, n: int) -> int:
         """Blocks of threads for n elements."""
         return -(-n // self.elements)
-
-
-class DeviceSourceOf(Protocol):
-    """Function that prints the device kernels of a kernel of a library in a folder."""
-
-    def __call__(self, folder: Path, kernel: str, real: str) -> DeviceSource:
-        """Return them; raises `TargetError` for a page that a device cannot run."""
-        ...
-
-
-class EmulatedLibraryOf(Protocol):
-    """Function that compiles device kernels for the processor; fibers: a thread is a fiber."""
-
-    def __call__(self, source: DeviceSource, fibers: bool) -> Path:
-        """Return the library; raises `BuildError` without a C++ compiler."""
-        ...
-
-
-device_source: DeviceSourceOf
-emulated_library: EmulatedLibraryOf
-"""The package sets both when it is imported."""
