@@ -44,6 +44,12 @@ print(f"sway {study.solve().at((0, 3000))['u_x']:.2f} mm")
 sway 1.74 mm
 ```
 
+Structures and solids at large displacements are nonlinear: linear published numbers are reached by
+small loads. Fields of an element with one point (trusses, beams) are those of its middle. A
+parameter that loads the body, such as `q_z`, acts in full from the start; `q_z=lambda t: 90 * t`
+grows with the load factor. On a line a law is in uniaxial strain: a bar is `truss`, or a law on a
+block. `theta_1`, `theta_2` of the shell turn its normal n about a and n x a.
+
 ![A slit ring lifted by a line force](pictures/library_slit_ring.png)
 ![A hemisphere pinched by two pairs of forces](pictures/library_hemisphere.png)
 ![A bar twisted until it yields](pictures/library_bar.png)
@@ -77,15 +83,20 @@ def _sections(numbers: dict[str, float]) -> list[str]:
     lines = []
     for kind, title in (("element", "Elements"), ("material", "Laws")):
         rows = [e for e in (entries() | built_in()).values() if e.kind == kind]
-        lines += [f"## {title}", "", "| name | what it is | cells | parameters | lines | source |"]
-        lines += ["|---|---|---|---|---|---|"]
+        lines += [
+            f"## {title}",
+            "",
+            "| name | what it is | cells | unknowns | parameters | lines | source |",
+        ]
+        lines += ["|---|---|---|---|---|---|---|"]
         for e in rows:
             text = e.path.read_text(encoding="utf-8")
             length = "built in" if e.name in built_in() else len(text.splitlines())
             parameters = "; ".join(f"`{k}` {v}" for k, v in e.parameters.items())
-            cells = e.cells or "any"
+            cells, unknowns = e.cells or "any", ", ".join(e.unknowns)
             lines.append(
-                f"| `{e.name}` | {e.summary} | {cells} | {parameters} | {length} | {e.source} |"
+                f"| `{e.name}` | {e.summary} | {cells} | {unknowns} | {parameters} | {length} | "
+                f"{e.source} |"
             )
         lines.append("")
     lines += ["## Published numbers", "", "| entry | problem | published | ours | error | source |"]

@@ -254,7 +254,8 @@ class Study:
             A side, or a predicate of coordinates (n, dim) for the faces of the boundary all of
             whose nodes it selects. Coordinates of one node, or node numbers, for forces.
         **components : float or callable
-            Unknown -> load in its direction [MPa on a side, N at a node]. A number is multiplied by
+            Unknown -> load in its direction [MPa on a side, N/mm of a page that has a thickness, N
+            at a node]. A number is multiplied by
             the load factor (in `march` it is constant); a function f(x, t) of coordinates (n, dim)
             gives the load (n,) itself.
 

@@ -215,6 +215,9 @@ def _arguments(tree: ast.Module) -> tuple[tuple[str, ...], dict[str, str]]:
             for k in node.keywords:
                 if k.arg and isinstance(k.value, ast.Constant):
                     parameters[k.arg] = str(k.value.value)
+        elif node.func.attr == "nodal_data":
+            meaning = next((ast.literal_eval(k.value) for k in node.keywords), "")
+            parameters |= {t: f"{meaning}, at nodes" for t in texts if isinstance(t, str)}
         elif node.func.attr in ("array", "table"):
             parameters |= {t: "several numbers" for t in texts[:1] if isinstance(t, str)}
     return tuple(dict.fromkeys(unknowns)), parameters

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
+from softehl.log import warn
 from softehl.runtime.analyses.initial_state import initial_state
 from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.arrays import Array, read_only
@@ -27,6 +28,11 @@ from softehl.runtime.suggestions import short_list
 _LENGTH = 1e-4
 """Of the size of the mesh: how far the difference of tangents of `buckling` goes. Its error is
 about the square of that."""
+
+
+_LEFT_OVER = 0.02
+"""Stiffness of the first mode that may be left at its factor. A column that is pressed along its
+axis leaves 1e-4; one that a hundredth of the load bends leaves as much as it had."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,4 +112,28 @@ def _buckling_modes(
         factors, modes = comm.buckling(tangent.problem, tangent.K, change, count)
     except (NoModes, SingularMatrix) as error:
         raise StudyError(f"{context}: {error}") from None
+    if len(factors):
+        factor = t + float(factors[0])
+        left = _left_over(system, problem_at(factor), x + factors[0] * response, modes[0], tangent)
+        if not left < _LEFT_OVER:
+            warn(
+                f"{context}: at the factor {factor:.4g} the body has deformed so much that "
+                f"{left:.0%} of the stiffness of the mode is left, not 0 %: take a start nearer to "
+                "it, buckling(start=result), or follow the path",
+                RuntimeWarning,
+                stacklevel=5,
+            )
     return t + factors, modes
+
+
+def _left_over(
+    system: System, distributed: Any, x: Array, mode: Array, initial: SymmetricTangent
+) -> float:
+    """Stiffness of a mode by the true tangent at x, by that of the initial state; inf if none."""
+    try:
+        K = SymmetricTangent.at(system, distributed, x, "").K
+    except StudyError:
+        return np.inf
+    stiffness = np.array([mode @ (K @ mode), mode @ (initial.K @ mode)])
+    there, here = system.comm.sum(stiffness)
+    return float(abs(there / here)) if here else np.inf

@@ -52,6 +52,10 @@ def picture_of(
             nodes = b.nodes[:, : len(CELLS[b.kind].nodes)]
             cells[b.kind] = np.concatenate([cells[b.kind], nodes]) if b.kind in cells else nodes
     values, label = (None, "") if name is None else _values(result, name, block, recovery)
+    if limits is None and values is not None:  # bent cells are interpolated beyond their nodes
+        limits = float(np.nanmin(values)), float(np.nanmax(values))
+    if all(CELLS[kind].dimension == 1 for kind in cells):
+        edges = False  # they would hide the colours of lines
     return Picture(
         _moved(result, deformed),
         cells or dict(system.mesh.cells),
@@ -107,7 +111,12 @@ def _values(result: Result, name: str, block: str | None, recovery: str) -> tupl
             total[defined] += fields[name][defined]
             count[defined] += 1
     if not count.any():
-        names = [*known, VON_MISES]
+        if name == VON_MISES:
+            raise StudyError(
+                f"plot: {VON_MISES} needs fields sigma_xx, sigma_yy, ... of the page; there are "
+                f"{join_names(known)}"
+            )
+        names = [*known, *([VON_MISES] if "sigma_xx" in known else [])]
         raise StudyError(
             f"plot: no unknown or field {name!r}{did_you_mean(name, names)}; there are "
             f"{join_names(names)}"

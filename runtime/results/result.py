@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -525,14 +525,14 @@ class Result:
     def _global_system(self) -> System:
         return self.system.everywhere
 
-    def reaction(self, where: str | Predicate) -> dict[str, float]:
+    def reaction(self, where: str | Predicate | Sequence[float]) -> dict[str, float]:
         """Return the sums of the forces of supports, ties and springs at the nodes of a side.
 
         Parameters
         ----------
-        where : str or callable
-            Side, group, or predicate of coordinates; or the name of a rigid body, for the force and
-            the moment that hold it, about axes that do not turn.
+        where : str, callable or tuple of float
+            Side, group, predicate of coordinates, or coordinates of one node; or the name of a
+            rigid body, for the force and the moment that hold it, about axes that do not turn.
 
         Returns
         -------
@@ -551,7 +551,11 @@ class Result:
                 moment = np.linalg.lstsq(spin_by_rotation(theta).T, np.array(forces[3:]))[0]
                 forces = [*forces[:3], *moment.tolist()]
             return dict(zip(components, forces, strict=True))
-        nodes = self.system.mesh.nodes(where)
+        mesh = self.system.mesh
+        if isinstance(where, str) or callable(where):
+            nodes = mesh.nodes(where)
+        else:
+            nodes = mesh.nodes_at(np.asarray(where, dtype=np.float64))
         sums = {}
         for name, numbers in self._global_system.numbering.nodal.items():
             dofs = numbers[nodes]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from softehl import Mesh, ModelFileError, Study, StudyError
+from softehl import Mesh, ModelFileError, Study, StudyError, von_mises
 from softehl.codegen.models.material_elements import LAWS
 from softehl.codegen.tools.library import (
     LONGEST,
@@ -131,3 +133,49 @@ def test_elements_without_a_hoop_strain_refuse_rings(element: str) -> None:
 def test_the_force_by_griffith_is_that_of_the_elastic_plate() -> None:
     published = next(b.published for b in fracture.BENCHMARKS if "Griffith" in b.problem)
     assert fracture.griffith() == pytest.approx(published, rel=1e-5)
+
+
+SHEET = {"E": 210e3, "nu": 0.3, "t": 2.0}
+RUBBER = {"mu": 0.5, "kappa": 20.0}
+STRESSED: list[tuple[str, str, dict[str, float]]] = [
+    ("plane_stress", "quad4", SHEET),
+    ("pian_sumihara", "quad4", SHEET),
+    ("plane_stress_neo_hooke", "quad4", RUBBER | {"t": 2.0}),
+    ("q1e4", "hex8", {"E": 210e3, "nu": 0.3}),
+    ("fbar", "hex8", RUBBER),
+    ("q1p0", "hex8", RUBBER),
+    ("q1e9", "hex8", RUBBER),
+    ("taylor_hood", "quad9", {"mu": 0.5}),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "kind", "given"), STRESSED)
+def test_stresses_are_those_of_the_reaction(name: str, kind: str, given: dict[str, float]) -> None:
+    """A block that is pulled: Cauchy stress times deformed area, and von Mises of it."""
+    order = 2 if kind == "quad9" else 1
+    sides = {"left": "u_x", "bottom": "u_y"}
+    if kind == "hex8":
+        mesh = Mesh.box(1, 1, 1, cells=(2, 1, 1))
+        sides |= {"bottom": "u_z", "front": "u_y"}
+    else:
+        mesh = Mesh.rectangle(1, 1, cells=(2, 1), order=order)
+    study = Study(mesh)
+    arguments: dict[str, Any] = dict(given)
+    study.add("b", element=name, **arguments)
+    for side, unknown in sides.items():
+        study.fix(side, **{unknown: 0})
+    large = "mu" in given
+    study.fix("right", u_x=0.3 if large else 1e-6)
+    result = study.solve(steps=3)
+    fields = result.at_nodes("b")
+    node = result.system.mesh.node_at(np.ones(mesh.dimension))
+    area = given.get("t", 1.0)
+    if large:
+        for axis in "yz"[: mesh.dimension - 1]:
+            area *= 1 + result.values(f"u_{axis}")[node]
+        area *= fields.get("stretch_across", np.ones(node + 1))[node]
+    force = result.reaction("right")["u_x"]
+    assert fields["sigma_xx"][node] * area == pytest.approx(force, rel=1e-6)
+    if kind != "quad9":
+        assert von_mises(fields)[node] == pytest.approx(abs(fields["sigma_xx"][node]))

@@ -51,6 +51,19 @@ def test_what_is_drawn() -> None:
         picture_of(result, "sigma")
     with pytest.raises(KeyError, match="no block 'sof'"):
         picture_of(result, "sigma_xx", block="sof")
+    assert u.limits == pytest.approx((0.0, result.values("u_x").max()))
+
+
+def test_a_frame_is_drawn_without_edges_and_has_no_von_mises() -> None:
+    study = Study(Mesh.frame([(0, 0), (0, 10)], cells=2))
+    study.add("mast", element="beam2d_reissner", EA=1e3, GA=1e3, EI=1e3)
+    study.fix((0, 0), u_x=0, u_y=0, theta=0)
+    study.load((0, 10), u_x=0.1)
+    result = study.solve()
+    assert not picture_of(result, "u").edges
+    with pytest.raises(StudyError, match="von_mises needs fields sigma_xx"):
+        picture_of(result, "von_mises")
+    assert result.reaction((0, 0))["u_x"] == pytest.approx(-0.1)
 
 
 def test_files_of_pictures(tmp_path: Path) -> None:

@@ -9,6 +9,8 @@ import sympy as sp
 
 from softehl import Fields, page
 
+ENTRIES = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("yz", 1, 2), ("xz", 0, 2))
+
 
 @page
 def fbar(m: Fields) -> None:
@@ -21,7 +23,11 @@ def fbar(m: Fields) -> None:
     centre = m.define("J_centre", m.centroid(J))
     scale = m.define("scale", (centre / J) ** sp.Rational(1, len(u)))
     stretch = sp.diag(*[scale] * len(u), *[1] * (3 - len(u)))
-    I1 = ((F * stretch).T * (F * stretch)).trace()
+    b = F * stretch * stretch * F.T
+    I1 = b.trace()
     W = mu / 2 * (I1 * centre ** sp.Rational(-2, 3) - 3) + kappa / 2 * (centre - 1) ** 2
     m.minimise(W)
-    m.fields(J=centre, pressure=-kappa * (centre - 1))
+    stress = mu * centre ** sp.Rational(-5, 3) * (b - I1 / 3 * sp.eye(3))
+    stress += kappa * (centre - 1) * sp.eye(3)
+    sigma = {f"sigma_{n}": stress[i, j] for n, i, j in ENTRIES}
+    m.fields(J=centre, pressure=-kappa * (centre - 1), **sigma)

@@ -28,4 +28,4 @@ def pian_sumihara(m: Fields) -> None:
     complementary = (1 + nu) / (2 * E) * (stress * stress).trace()
     complementary -= nu / (2 * E) * stress.trace() ** 2
     m.minimise(t * ((stress * strain).trace() - complementary))
-    m.fields(sigma_xx=stress[0, 0], sigma_yy=stress[1, 1], sigma_xy=stress[0, 1])
+    m.fields(sigma_xx=stress[0, 0], sigma_yy=stress[1, 1], sigma_zz=0, sigma_xy=stress[0, 1])

@@ -24,6 +24,5 @@ def plane_stress(m: Fields) -> None:
     m.minimise(t * stiffness / 2 * ((1 - nu) * (strain**2).trace() + nu * strain.trace() ** 2))
     stress = stiffness * ((1 - nu) * strain + nu * strain.trace() * sp.eye(2))
     across = -nu / E * stress.trace()
-    m.fields(
-        sigma_xx=stress[0, 0], sigma_yy=stress[1, 1], sigma_xy=stress[0, 1], strain_across=across
-    )
+    sigma = {"sigma_xx": stress[0, 0], "sigma_yy": stress[1, 1], "sigma_xy": stress[0, 1]}
+    m.fields(**sigma, sigma_zz=0, strain_across=across)

@@ -31,4 +31,8 @@ def plane_stress_neo_hooke(m: Fields) -> None:
 
     s = m.implicit("s", lambda s: m.derivative("across", energy(s), s), start=1 / area)
     m.minimise(t * energy(s))
-    m.fields(stretch_across=s, J=area * s)
+    J = area * s
+    deviator = F * F.T - (square + s**2) / 3 * sp.eye(2)
+    stress = mu * J ** sp.Rational(-5, 3) * deviator + kappa / 2 * (J - 1 / J) * sp.eye(2)
+    sigma = {"sigma_xx": stress[0, 0], "sigma_yy": stress[1, 1], "sigma_xy": stress[0, 1]}
+    m.fields(stretch_across=s, J=J, **sigma, sigma_zz=0)

@@ -9,6 +9,8 @@ import sympy as sp
 
 from softehl import Fields, ModelError, page
 
+ENTRIES = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("yz", 1, 2), ("xz", 0, 2))
+
 
 @page
 def q1e4(m: Fields) -> None:
@@ -26,5 +28,6 @@ def q1e4(m: Fields) -> None:
     strain = (gradient + gradient.T) / 2
     lame, mu = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 + 2 * nu)
     m.minimise(lame / 2 * strain.trace() ** 2 + mu * (strain.T * strain).trace())
-    stress = lame * strain.trace() * sp.eye(size) + 2 * mu * strain
-    m.fields(sigma_xx=stress[0, 0], sigma_yy=stress[1, 1], sigma_xy=stress[0, 1])
+    stress = lame * strain.trace() * sp.eye(3)
+    stress[:size, :size] += 2 * mu * strain
+    m.fields(**{f"sigma_{n}": stress[i, j] for n, i, j in ENTRIES})

@@ -9,6 +9,8 @@ import sympy as sp
 
 from softehl import Fields, ModelError, page
 
+ENTRIES = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("yz", 1, 2), ("xz", 0, 2))
+
 
 @page
 def q1e9(m: Fields) -> None:
@@ -26,6 +28,9 @@ def q1e9(m: Fields) -> None:
     added[:size, :size] = centre.det() / jacobian.det() * modes
     F = m.define("enhanced", m.deformation_gradient(u) + added)
     J = m.define("J", F.det())
-    W = mu / 2 * ((F.T * F).trace() * J ** sp.Rational(-2, 3) - 3) + kappa / 2 * (J - 1) ** 2
-    m.minimise(W)
-    m.fields(J=J, pressure=-kappa * (J - 1))
+    I1 = (F.T * F).trace()
+    m.minimise(mu / 2 * (I1 * J ** sp.Rational(-2, 3) - 3) + kappa / 2 * (J - 1) ** 2)
+    stress = mu * J ** sp.Rational(-5, 3) * (F * F.T - I1 / 3 * sp.eye(3))
+    stress += kappa * (J - 1) * sp.eye(3)
+    sigma = {f"sigma_{n}": stress[i, j] for n, i, j in ENTRIES}
+    m.fields(J=J, pressure=-kappa * (J - 1), **sigma)

@@ -9,6 +9,8 @@ import sympy as sp
 
 from softehl import Fields, page
 
+ENTRIES = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("yz", 1, 2), ("xz", 0, 2))
+
 
 @page
 def q1p0(m: Fields) -> None:
@@ -21,4 +23,6 @@ def q1p0(m: Fields) -> None:
     I1 = (F.T * F).trace()
     W = mu / 2 * (I1 * J ** sp.Rational(-2, 3) - 3) + p * (J - 1) - p**2 / (2 * kappa)
     m.minimise(W)
-    m.fields(J=J, pressure=-p)
+    deviator = F * F.T - I1 / 3 * sp.eye(3)
+    stress = mu * J ** sp.Rational(-5, 3) * deviator + p * sp.eye(3)
+    m.fields(J=J, pressure=-p, **{f"sigma_{n}": stress[i, j] for n, i, j in ENTRIES})

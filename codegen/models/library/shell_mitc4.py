@@ -19,16 +19,17 @@ def shell_mitc4() -> Definition:
     E, nu, t = m.parameters(E="Young's modulus [MPa]", nu="Poisson's ratio", t="thickness [mm]")
     q = sp.Matrix(m.parameters(q_x="load of an area along x [MPa]", q_y="along y", q_z="along z"))
     m.require(E > 0, nu > -1, nu <= sp.Rational(1, 2), t > 0)
-    n = m.nodal_data("n_x", "n_y", "n_z", meaning="director of unit length")
-    a = m.nodal_data("a_x", "a_y", "a_z", meaning="unit vector normal to the director")
+    n = m.nodal_data("n_x", "n_y", "n_z", meaning="normal of the shell")
+    a = m.nodal_data("a_x", "a_y", "a_z", meaning="vector near axis 1")
     nodes = range(4)
     start = [sp.Matrix([c[k] for c in X]) for k in nodes]
     moved = [sp.Matrix([c[k] for c in u]) for k in nodes]
-    normal = [sp.Matrix([c[k] for c in n]) for k in nodes]
+    normal = [m.define(f"n_{k}", (v := sp.Matrix([c[k] for c in n])) / m.norm(v)) for k in nodes]
     director = []
     for k in nodes:
-        first = sp.Matrix([c[k] for c in a])
-        turn = angles[0][k] * first + angles[1][k] * normal[k].cross(first)
+        side = normal[k].cross(sp.Matrix([c[k] for c in a]))
+        side = m.define(f"side_{k}", side / m.norm(side))
+        turn = angles[0][k] * side.cross(normal[k]) + angles[1][k] * side
         size = m.define(f"angle_{k}", m.norm([angles[0][k], angles[1][k]]))
         bent = normal[k] * sp.cos(size) + turn.cross(normal[k]) * m.sinc(size)
         director.append(m.define(f"director_{k}", bent))

@@ -5,7 +5,11 @@ Source: Sussman and Bathe (1987), Computers & Structures 26, 357-409.
 Benchmark: incompressible tube under inner pressure at large strain.
 """
 
+import sympy as sp
+
 from softehl import Fields, page
+
+ENTRIES = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("yz", 1, 2), ("xz", 0, 2))
 
 
 @page
@@ -17,4 +21,5 @@ def taylor_hood(m: Fields) -> None:
     F = m.deformation_gradient(u)
     J = m.define("J", F.det())
     m.minimise(mu / 2 * ((F.T * F).trace() - 3) + p * (J - 1))
-    m.fields(J=J)
+    stress = mu / J * F * F.T + p * sp.eye(3)
+    m.fields(J=J, **{f"sigma_{n}": stress[i, j] for n, i, j in ENTRIES})
