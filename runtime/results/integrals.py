@@ -40,6 +40,8 @@ def integral(result: Result, text: str, where: str | None, block: str | None) ->
     if mesh.piece is not None:
         raise StudyError("integral: the mesh is distributed: integrate with one process")
     domain = _Domain.of(mesh, where)
+    if block is None:
+        _require_one_meaning(result, expression)
     known = {*result.system.everywhere.numbering.nodal, *_AXES[: mesh.dimension], "t"}
     known |= set(_NORMAL[: mesh.dimension]) if domain.is_side else set()
     if block is None and set(expression.names) <= known and not _on_page(result, expression):
@@ -78,6 +80,19 @@ class _Domain:
         if own is nodes:
             return np.ones(len(nodes), dtype=bool)
         return np.asarray(match_faces(nodes, own, nodes.shape[1]) >= 0)
+
+
+def _require_one_meaning(result: Result, expression: Expression) -> None:
+    """Raise StudyError where t, x, y or z is also an argument or field of a page."""
+    mesh = result.system.mesh
+    for b in result.system.everywhere.blocks.values():
+        own = {*b.parameters, *b.data, *b.kernel.fields}
+        for name in sorted({"t", *_AXES[: mesh.dimension]} & own & set(expression.names)):
+            meaning = "the time or load factor" if name == "t" else "a coordinate"
+            raise StudyError(
+                f"integral({expression.text!r}): {name!r} is {meaning}, and of block {b.name!r}: "
+                f"block={b.name!r} takes that of the block"
+            )
 
 
 def _on_page(result: Result, expression: Expression) -> bool:

@@ -187,3 +187,14 @@ def test_bars_have_no_volume() -> None:
     with pytest.raises(StudyError, match=r"quadrature of 'bar' .truss. is not that of its cells"):
         study.integral("stretch")
     assert study.integral("1") == pytest.approx(2.0)
+
+
+def test_t_of_a_sheet_is_not_taken_for_the_time() -> None:
+    study = Study(Mesh.rectangle(10, 1, cells=(2, 1)))
+    study.add("sheet", element="plane_stress", E=1e3, nu=0.3, t=2.0)
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_x=1.0)
+    result = study.solve()
+    with pytest.raises(StudyError, match="'t' is the time or load factor, and of block 'sheet'"):
+        result.integral("t*sigma_xx")
+    assert result.integral("t", block="sheet") == pytest.approx(20.0)
