@@ -271,7 +271,8 @@ class DeviceKernels:
 
     def basis(self, order: int) -> NDArray[np.float64]:
         """Values and parent slopes (points, nodes, 1 + D) of an order, x running first."""
-        nodes = [-1.0, 1.0] if order == 1 else list(self.tables["nodes"])
+        own = order == self.n - 1
+        nodes = list(self.tables["nodes"] if own else np.linspace(-1.0, 1.0, order + 1))
         N, M = lagrange(nodes, list(self.tables["points"]))
         k, D = len(nodes), self.D
         q = np.unravel_index(np.arange(self.points), (self.q,) * D)
