@@ -643,7 +643,7 @@ def test_every_film_of_a_drawn_gland_is_found(number: int) -> None:
     assert found["message"] == ""
     assert len(found["states"]) == 2 * len(SAMPLE_SPEEDS)
     doubted = [state for state in found["states"] if not are_found([state])]
-    assert len(doubted) <= 1  # for the estimate of its error alone
+    assert len(doubted) <= 2  # for the estimate of its error, or by the theory of the inlet
     assert all(state["verdict"] == UNCERTAIN for state in doubted)
 
 
