@@ -228,6 +228,12 @@ def _at(name: str, at: tuple[float, ...] | None) -> PointValue:
 def _require(name: str, system: System) -> None:
     nodal = system.numbering.nodal
     if name not in nodal:
+        body, _, motion = name.rpartition(":")
+        if body:
+            raise StudyError(
+                f"at={body!r}: no rigid body has {motion!r}; a place is a tuple of numbers, "
+                "(48, 60)"
+            )
         raise StudyError(
             f"no unknown {name!r}{did_you_mean(name, nodal)}; at nodes: {join_names(nodal)}"
         )

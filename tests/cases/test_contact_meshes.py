@@ -203,8 +203,9 @@ OTHER_WORDS = {
     *("eyring_stress", "carreau_rate"),
     *("bore", "groove_diameter"),
     *("ring", "rod", "squeeze", "groove_depth", "fill", "gland", "backup", "said", "compound"),
-    *("sensitivity", "tolerances", "travel"),
+    *("sensitivity", "tolerances", "travel", "service"),
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
+    *("modulus_rule", "modulus_table", "glass_transition", "swelling", "compression_set"),
 }
 """Other words for the diameters and the width, for rubber and oil, which are what matters."""
 

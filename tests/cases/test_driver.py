@@ -321,7 +321,11 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"temperature": 80.0}, "temperature = 80 has no effect without an oil or a fit"),
+        (
+            {"temperature": 80.0},
+            "temperature = 80 has no effect without an oil, a fit, or a rubber by its hardness in "
+            "the cold",
+        ),
         ({"corner_fillet": 0.2}, "corner_fillet = 0.2 has no effect without an extrusion_gap"),
         ({"boundary_friction": 0.2}, "boundary_friction = 0.2 has no effect without a roughness"),
         ({"asperity_stiffness": 5.0}, "asperity_stiffness = 5 has no effect without a roughness"),

@@ -551,7 +551,8 @@ RELATIONS: dict[str, Relation] = {
         ("law", "cell", "constraint", "geometry", "solver"),
         quick=("law",),
         tolerance=1e-6,
-        of=lambda at: at.law != "softened",  # its history has a number for each term
+        # history of a number for each term, and states of unit cells, are not given so
+        of=lambda at: at.law not in ("softened", "unit cells"),
     ),
     "restart": Relation(
         restarted,

@@ -10,13 +10,9 @@ def link(a: Arguments, dofs: Vector) -> Number:
     d = 2 if len(dofs) == 7 else 3
     u, force, U, theta = dofs[:d], dofs[d : 2 * d], dofs[2 * d : 3 * d], dofs[3 * d :]
     arm = [a.X[c] - a.data[c] for c in range(d)]
-    if a.data[d]:
-        turned = _times(rotation(theta), arm)
-        moved = [t - r for t, r in zip(turned, arm, strict=True)]
-    elif d == 2:
-        moved = [-theta[0] * arm[1], theta[0] * arm[0]]
-    else:
-        moved = _cross(theta, arm)
+    finite, turned = a.data[d], _times(rotation(theta), arm)
+    small = [-theta[0] * arm[1], theta[0] * arm[0]] if d == 2 else _cross(theta, arm)
+    moved = [finite * (turned[c] - arm[c]) + (1 - finite) * small[c] for c in range(d)]
     return _dot(force, [u[c] - U[c] - moved[c] for c in range(d)])
 
 

@@ -36,10 +36,10 @@ from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.kernels.kernel import load_kernel
 
 WITHOUT_INFLUENCE = (
-    *(*Seal.names, "ogden_terms"),  # values of others follow
+    *(*Seal.names, "ogden_terms", "glass_transition"),  # values of others follow
     *(*Oil.model_fields, *Surfaces.model_fields, *Numerics.model_fields),
     *("cavitation", "cavitation_pressure", "cavitation_penalty", "shear_traction"),
-    *("stroke", "speeds", "travel", "error_estimate", "tolerance", "upwinding"),
+    *("stroke", "speeds", "travel", "service", "error_estimate", "tolerance", "upwinding"),
     *("pressure_order", "reynolds", "quadrature", "quadrature_points"),
 )
 """Parameters that the contact stage does not know."""
