@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -65,6 +66,14 @@ class DeviceBlock:
             cls._history(block, module),
         )
 
+    def at(self, block: ElementBlock, parameters: Array) -> DeviceBlock:
+        """These elements with parameters, and the history of `block`; they share the geometry."""
+        assert self.geometry is not None
+        other = copy(self)
+        other.parameters = self.module.real(np.append(parameters, 0.0))
+        other.history = self._history(block, self.module)
+        return other
+
     @staticmethod
     def _history(block: ElementBlock, module: DeviceModule) -> Any:
         """History with x running first in the points, block by block."""
@@ -79,14 +88,14 @@ class DeviceBlock:
         grouped = padded.reshape(source.blocks(n), source.elements * source.points, k)
         return module.real(grouped.transpose(0, 2, 1))
 
-    def _kept(self, n: int, numbers: int) -> Any:
+    def _kept(self, numbers: int) -> Any:
         source = self.module.source
-        return self.module.zeros(source.blocks(n), numbers, source.elements * source.points)
+        return self.module.zeros(source.blocks(self.n), numbers, source.elements * source.points)
 
     @cached_property
     def geometry(self) -> Any:
         """Inverse Jacobian and volume at the points."""
-        kept = self._kept(self.n, self.module.source.geometry)
+        kept = self._kept(self.module.source.geometry)
         self.module.launch("geometry", self.n, (self.places, self.X, kept))
         return kept
 
@@ -107,7 +116,7 @@ class DeviceBlock:
 
     def moduli(self, u: Any) -> Any:
         """Moduli of the parent cell at the points."""
-        kept = self._kept(self.n, self.module.source.moduli)
+        kept = self._kept(self.module.source.moduli)
         arrays = self.parameters, self.history, self.index, self.places, self.X, u, kept
         self.module.launch("moduli", self.n, arrays)
         return kept

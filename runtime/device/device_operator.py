@@ -24,7 +24,7 @@ from softehl.runtime.device.device_module import DeviceModule
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.matrix_free_operator import MatrixFreeOperator, level_in
 from softehl.runtime.discretisation.matrix_free_products import lexicographic, require_product
-from softehl.runtime.discretisation.p_multigrid import LOWER, MultigridLevels, cell_of
+from softehl.runtime.discretisation.p_multigrid import LOWER, MultigridLevels, cell_of, inverse
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.solve.linear.amg import available, hierarchy
 from softehl.runtime.solve.linear.coarse_grid_solver import DIRECT_BELOW, coarse_solver
@@ -61,6 +61,7 @@ class Device:
     load: Callable[..., DeviceModule] = load_module
     modules: dict[str, DeviceModule] = field(default_factory=dict)
     patterns: dict[str, SparsePattern] = field(default_factory=dict)
+    blocks: dict[str, tuple[ElementBlock, DeviceBlock]] = field(default_factory=dict)
 
     def require(self, block: ElementBlock) -> None:
         """Load the kernels of a block.  Raises StudyError where a device cannot run them."""
@@ -74,9 +75,11 @@ class Device:
     ) -> DeviceProduct:
         """See `Backend`."""
         module, numbers = self.modules[block.name], levels.unknowns[0]
-        position = np.empty(len(x), dtype=np.int64)
-        position[numbers] = np.arange(len(numbers))
-        made = DeviceBlock.of(block, parameters, module, position)
+        if block.name in self.blocks and _same_elements(self.blocks[block.name][0], block):
+            made = self.blocks[block.name][1].at(block, parameters)
+        else:
+            made = DeviceBlock.of(block, parameters, module, inverse(numbers, len(x)))
+            self.blocks[block.name] = block, made
         return DeviceProduct(made, module.array(x[numbers]))
 
     def coarse(
@@ -106,6 +109,11 @@ class Device:
     def space(self, operator: MatrixFreeOperator) -> DeviceSpace:
         """See `Backend`."""
         return DeviceSpace(operator, next(iter(self.modules.values())))
+
+
+def _same_elements(a: ElementBlock, b: ElementBlock) -> bool:
+    """True if only data and history of two blocks may differ."""
+    return a.dofs is b.dofs and a.coordinates is b.coordinates
 
 
 def _pattern(

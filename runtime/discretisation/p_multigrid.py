@@ -131,7 +131,7 @@ class MultigridLevels:
         while orders[-1] > 1:
             orders.append(LOWER[orders[-1]])
         numbers = _node_by_node(nodal, size)
-        position = _inverse(numbers, size)
+        position = inverse(numbers, size)
         dofs = [{b.name: position[b.dofs] for b in pages}]
         unknowns = [numbers]
         steps: list[csr_array] = []
@@ -140,8 +140,8 @@ class MultigridLevels:
             first = np.concatenate([d[:, :, 0].ravel() for d in lower_dofs.values()])
             at = np.flatnonzero(np.isin(nodal[0], first))
             level_unknowns = np.stack([numbers[at] for numbers in nodal], axis=1).ravel()
-            inverse = _inverse(level_unknowns, size)
-            dofs.append({n: inverse[d.reshape(len(d), -1)] for n, d in lower_dofs.items()})
+            places = inverse(level_unknowns, size)
+            dofs.append({n: places[d.reshape(len(d), -1)] for n, d in lower_dofs.items()})
             pairs = [
                 (
                     dofs[-2][b.name],
@@ -167,7 +167,7 @@ def _node_by_node(nodal: Sequence[Integers], size: int) -> Integers:
     return np.concatenate([first, np.setdiff1d(np.arange(size), first)])
 
 
-def _inverse(numbers: Integers, size: int) -> Integers:
+def inverse(numbers: Integers, size: int) -> Integers:
     """Place of each of `size` unknowns among numbers."""
     positions = np.empty(size, dtype=np.int64)
     positions[numbers] = np.arange(len(numbers))

@@ -86,10 +86,12 @@ class StrictModule(EmulatedModule):
     def __init__(self, source: DeviceSource) -> None:
         super().__init__(source)
         self.launched = 0
+        self.geometries = 0
 
     def launch(self, kernel: str, n: int, arrays: Any, *, backwards: bool = False) -> None:
         assert all(a is None or isinstance(a, There) for a in arrays), kernel
         self.launched += 1
+        self.geometries += kernel == "geometry"
         super().launch(kernel, n, [a if a is None else np.asarray(a) for a in arrays])
 
     def array(self, a: Any) -> Any:
@@ -127,6 +129,7 @@ def test_arrays_of_host_and_device_do_not_mix(
     result = study.solve(linear="matrix-free", device="cuda")
     assert result.values("u_x") == pytest.approx(expected.values("u_x"), abs=1e-11)
     assert made[0].launched > 100
+    assert made[0].geometries == 1
 
 
 @pytest.mark.parametrize(
