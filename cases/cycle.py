@@ -139,7 +139,7 @@ BREAKAWAY = 0.1
 class CycleRow(Row):
     """A row of curve.csv: one cycle."""
 
-    files = ("loop_{}.csv", "film_{}.csv", "state_{}.csv", "section_{}.csv")
+    files = tuple(f"{name}_cycle_{{}}.csv" for name in ("loop", "film", "state", "section"))
     cycle: float = column("", "number of the cycle", head="cycle", number_format="g")
     leak_mm3: float = column(
         "mm3", "oil past the air end, + = out", head="leak", number_format=".4g"

@@ -10,7 +10,7 @@ from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.io import read_table
 from softehl.runtime.solve.solution import Solution, Status
 
-PICTURE = "rows"
+PICTURE = "profiles"
 
 
 class RowByRow(Case[P, R]):

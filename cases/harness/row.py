@@ -141,8 +141,11 @@ class Row(Record):
 
     @property
     def name(self) -> str:
-        """The part of a file name that tells this row from the others of its folder."""
-        return number_text(self.key)
+        """The part of a file name that tells this row from the others of its folder: key and unit.
+
+        A unit has no slash there: "100mm_s".
+        """
+        return f"{number_text(self.key)}{self.key_column().unit.replace('/', '_')}"
 
     @property
     def order(self) -> tuple[Any, ...]:

@@ -16,7 +16,7 @@ from softehl.cases.harness.sweep import differences
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.run_plan import SIGNS
-from softehl.cases.seal.states.state import COLLAPSED, FilmRow, Profile
+from softehl.cases.seal.states.state import COLLAPSED, FilmRow, Profile, contact_name
 from softehl.cases.seal.states.state_files import read_profile
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import number_text, read_columns, read_json
@@ -169,8 +169,7 @@ class Store:
 
     def contact(self, parameters: Seal) -> tuple[Array, Array] | None:
         """x (mm) and frictionless contact pressure (MPa) along the arc, None if not reached."""
-        name = number_text(parameters.sealed_pressure)
-        path = self.run_folder(parameters) / f"contact_{name}.csv"
+        path = self.run_folder(parameters) / f"{contact_name(parameters.sealed_pressure)}.csv"
         if not path.exists():
             return None
         columns = read_columns(path, ("x_mm", "p_MPa"))

@@ -12,6 +12,7 @@ from softehl.cases.paper.states import SPEEDS, Request, Store, ask, setup
 from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import DENSITIES
+from softehl.cases.seal.states.state import contact_name
 from softehl.runtime.io import number_text
 
 if TYPE_CHECKING:
@@ -169,8 +170,7 @@ def _section(axes: Axes, p: Seal, store: Store) -> None:
     if contact is None:
         axes.text(0.5, 0.5, "not reached")
         return
-    name = number_text(p.sealed_pressure)
-    mesh = meshio.read(store.run_folder(p) / f"contact_{name}.vtu")
+    mesh = meshio.read(store.run_folder(p) / f"{contact_name(p.sealed_pressure)}.vtu")
     corners: Any = np.asarray(mesh.points)[mesh.cells[0].data][:, :, :2]
     _quads(axes, corners)
     rod, housing, half = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter, 0.5 * p.groove_width

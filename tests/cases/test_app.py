@@ -77,14 +77,14 @@ def test_a_stopped_run_keeps_what_it_has_and_goes_on(tmp_path: Path) -> None:
         state = desk.state(name)
         assert (state.status, state.requested) == ("stopped", 7)
         assert 1 <= state.done < 7
-        first = (tmp_path / name / "profile_1_800.csv").stat().st_mtime_ns
+        first = (tmp_path / name / "profile_1MPa_out_800mm_s.csv").stat().st_mtime_ns
         desk.resume(name)
         desk.processes[name].wait(240)
     finally:
         desk.close()
     state = desk.state(name)
     assert (state.status, state.done, state.requested) == ("done", 7, 7)
-    assert (tmp_path / name / "profile_1_800.csv").stat().st_mtime_ns == first
+    assert (tmp_path / name / "profile_1MPa_out_800mm_s.csv").stat().st_mtime_ns == first
     other = Desk(tmp_path)  # of another session
     assert [s.name for s in other.states()] == [name]
     again = tmp_path / "again.toml"

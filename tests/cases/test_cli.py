@@ -54,9 +54,9 @@ FAST = ("--set", "speeds=[400, 100]")
 PLOTS = {f"{name}.png" for name in PICTURES}
 FILES = {
     *("run.json", "curve.csv", "leakage.csv"),
-    *("contact_1.csv", "contact_1.vtu"),
-    *(f"profile_1_{u}.csv" for u in (400, 100, -400, -100)),
-    *(f"section_1_{u}.vtu" for u in (400, 100, -400, -100)),
+    *("contact_1MPa.csv", "contact_1MPa.vtu"),
+    *(f"profile_1MPa_{u}mm_s.csv" for u in ("out_400", "out_100", "in_400", "in_100")),
+    *(f"section_1MPa_{u}mm_s.vtu" for u in ("out_400", "out_100", "in_400", "in_100")),
     *("gland.vtu", "section_out.pvd", "section_in.pvd"),
 }
 USED = {"film": kernel_signatures()["film"]}
@@ -308,7 +308,7 @@ def test_a_run_writes_its_files(here: Path, invoke: Invoke) -> None:
     assert speeds(folder) == [400.0, 100.0, -400.0, -100.0]
     assert rows(folder)[0][2:5] == ["2", "nan", "1.6"]
     assert {row[-1] for row in rows(folder)} == {OK}
-    profile = (folder / "profile_1_-100.csv").read_text().splitlines()
+    profile = (folder / "profile_1MPa_in_100mm_s.csv").read_text().splitlines()
     assert profile[0] == "x_mm,h_um,p_MPa,tau_MPa,flux_mm2_s,tau_rod_MPa"
     assert len(profile) == 6
     assert any("h*" in line and "friction" in line for line in out)
@@ -421,7 +421,7 @@ def test_a_collapsed_film_is_no_result(here: Path, invoke: Invoke) -> None:
     assert code == 3
     assert speeds(folder) == [400.0]
     assert speeds(folder / "rejected") == [100.0]
-    assert not (folder / "profile_1_100.csv").exists()
+    assert not (folder / "profile_1MPa_out_100mm_s.csv").exists()
     flagged = [line for line in out if "COLLAPSED" in line]
     assert len(flagged) == 1
     assert flagged[0].split() == ["+100", *"--------", "COLLAPSED"]
@@ -443,7 +443,12 @@ def test_an_error_leaves_what_was_reached(here: Path, invoke: Invoke) -> None:
     assert content["status"] == "interrupted"
     assert content["message"] == "ArithmeticError: broken"
     assert content["stages"][0]["steps"] == [{"parameter": 400.0, "residuals": [1.0]}]
-    assert names(folder) == {"run.json", "curve.csv", "profile_1_400.csv", "section_1_400.vtu"}
+    assert names(folder) == {
+        "run.json",
+        "curve.csv",
+        "profile_1MPa_out_400mm_s.csv",
+        "section_1MPa_out_400mm_s.vtu",
+    }
 
 
 def run_and_die(folder: str) -> None:

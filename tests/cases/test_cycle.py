@@ -192,8 +192,8 @@ def test_a_cycle_balances_and_becomes_periodic(tmp_path: Path) -> None:
     assert table["change_percent"][-1] < 1.0
     assert table["leak_mm3"][-1] == pytest.approx(table["leak_sealed_mm3"][-1], rel=2e-3)
     assert table["friction_in_N"][-1] < 0.0 < table["friction_out_N"][-1]
-    loop = read_table(tmp_path / "c" / "loop_3.csv")
-    film = read_table(tmp_path / "c" / "film_3.csv")
+    loop = read_table(tmp_path / "c" / "loop_cycle_3.csv")
+    film = read_table(tmp_path / "c" / "film_cycle_3.csv")
     assert len(film["t_s"]) % len(loop["t_s"]) == 0
     assert np.all(np.diff(loop["t_s"]) > 0.0)
 
@@ -245,7 +245,7 @@ def test_a_run_that_goes_on_does_the_same_to_the_last_bit(
     cycle(tmp_path / "parts", *given, "cycles=1")
     keys = [f"--set={s}" for s in ("density=1", "roughness=0.3", *given, "cycles=2")]
     parts = tmp_path / "parts"
-    begun = (parts / "loop_1.csv").stat().st_mtime_ns
+    begun = (parts / "loop_cycle_1.csv").stat().st_mtime_ns
     resume = ["run", "cycle", *keys, "--out", str(parts), "--resume", "--quiet"]
     steps, drafts = [0], parts / "unfinished.npz"
     film_of = cycle_driver._film
@@ -266,8 +266,8 @@ def test_a_run_that_goes_on_does_the_same_to_the_last_bit(
     assert len(held["loop/t_s"]) == 23
     assert softehl.main(resume) == 0
     assert not drafts.exists()
-    assert (parts / "loop_1.csv").stat().st_mtime_ns == begun
-    for name in ("curve.csv", "loop_2.csv", "film_2.csv", "state_2.csv"):
+    assert (parts / "loop_cycle_1.csv").stat().st_mtime_ns == begun
+    for name in ("curve.csv", "loop_cycle_2.csv", "film_cycle_2.csv", "state_cycle_2.csv"):
         assert (parts / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 

@@ -218,12 +218,12 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
         f / "curve.csv", row_of(f, "-400"), row_of(f, "-400") + "\n" + row_of(f, "-400")
     ),
     "a row less": lambda f: edited(f / "curve.csv", row_of(f, "-400") + "\n", ""),
-    "a profile edited": lambda f: edited(f / "profile_1_-400.csv", "4", "5"),
-    "a profile cut": lambda f: (f / "profile_1_-400.csv").write_bytes(
-        (f / "profile_1_-400.csv").read_bytes()[:-2]
+    "a profile edited": lambda f: edited(f / "profile_1MPa_in_400mm_s.csv", "4", "5"),
+    "a profile cut": lambda f: (f / "profile_1MPa_in_400mm_s.csv").write_bytes(
+        (f / "profile_1MPa_in_400mm_s.csv").read_bytes()[:-2]
     ),
-    "a profile lost": lambda f: (f / "profile_1_-400.csv").unlink(),
-    "a section lost": lambda f: (f / "section_1_-400.vtu").unlink(),
+    "a profile lost": lambda f: (f / "profile_1MPa_in_400mm_s.csv").unlink(),
+    "a section lost": lambda f: (f / "section_1MPa_in_400mm_s.vtu").unlink(),
 }
 
 
@@ -253,7 +253,7 @@ def test_a_table_of_sensitivities_that_was_edited_is_not_believed(
     done: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its state is computed again, and no report has it."""
-    slopes = done / "sensitivity_1_-400.csv"
+    slopes = done / "sensitivity_1MPa_in_400mm_s.csv"
     slopes.write_text("a,b\n1,2\n")
     content = json.loads((done / "run.json").read_text())
     content["tables"] = table_digests(done, CASE)
@@ -261,7 +261,7 @@ def test_a_table_of_sensitivities_that_was_edited_is_not_believed(
     (done / "run.json").write_text(json.dumps(content))
     assert len(read_finished(done, SHIPPED).rows) == 4
     slopes.write_text("a,b\n1,3\n")
-    with pytest.raises(BadInput, match=r"sensitivity_1_-400\.csv is not what was written"):
+    with pytest.raises(BadInput, match=r"sensitivity_1MPa_in_400mm_s\.csv is not what was written"):
         read_finished(done, SHIPPED)
     assert resumed(monkeypatch) == (0, [("in", 400.0)])
 

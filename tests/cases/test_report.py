@@ -405,7 +405,7 @@ def test_an_error_of_a_page_is_seen(browser: Any, tmp_path: Path) -> None:
 def _thinnest(folder: Path, speed: int) -> float:
     from softehl.runtime.io import read_table
 
-    return float(read_table(folder / f"profile_1_{speed}.csv")["h_um"].min())
+    return float(read_table(folder / f"profile_1MPa_out_{speed}mm_s.csv")["h_um"].min())
 
 
 LARGEST = 5_000_000

@@ -174,7 +174,8 @@ def write_state(
     }
     write_csv(folder / "curve.csv", FilmRow.header(), [[*list(values.values())[:-1], verdict]])
     header = ("x_mm", "h_um", "p_MPa", "tau_MPa", "flux_mm2_s", "tau_rod_MPa")
-    name = f"profile_{parameters.sealed_pressure:g}_{speed:g}.csv"
+    stroke = "out" if speed > 0 else "in"
+    name = f"profile_{parameters.sealed_pressure:g}MPa_{stroke}_{abs(speed):g}mm_s.csv"
     places = np.linspace(-1.0, 1.0, len(h)).tolist()
     write_csv(
         folder / name, header, [[x, t, x, 0.0, 1.0, 0.0] for x, t in zip(places, h, strict=True)]

@@ -263,9 +263,15 @@ def curve(folder: Path) -> list[list[str]]:
 def test_a_run_and_what_it_writes(tmp_path: Path) -> None:
     assert run(tmp_path / "a", "--set", "speeds=[100, -200]") == 0
     names = {path.name for path in (tmp_path / "a").iterdir()}
-    assert names == {"curve.csv", "run.json", "rows.png", "profile_100.csv", "profile_-200.csv"}
+    assert names == {
+        "curve.csv",
+        "run.json",
+        "profiles.png",
+        "profile_100mm_s.csv",
+        "profile_-200mm_s.csv",
+    }
     assert [line[0] for line in curve(tmp_path / "a")] == ["100", "-200"]
-    header, first, *_ = (tmp_path / "a" / "profile_100.csv").read_text().splitlines()
+    header, first, *_ = (tmp_path / "a" / "profile_100mm_s.csv").read_text().splitlines()
     assert header == "x_mm,h_um,p_MPa"
     assert float(first.split(",")[0]) == pytest.approx(-1.5, abs=1e-2)
     content = json.loads((tmp_path / "a" / "run.json").read_text())

@@ -95,8 +95,14 @@ def damages(work: Path, clock: Clock, rng: random.Random, tally: Tally) -> None:
     good = work / "good"
     assert done(*RUN, str(good), cwd=work).code == 0
     expected = curve(good)
-    names = ["run.json", "curve.csv", "leakage.csv", "profile_1_400.csv", "section_1_400.vtu"]
-    trials = [(name, kind) for name in [*names, "contact_1.csv"] for kind in DAMAGES]
+    names = [
+        "run.json",
+        "curve.csv",
+        "leakage.csv",
+        "profile_1MPa_out_400mm_s.csv",
+        "section_1MPa_out_400mm_s.vtu",
+    ]
+    trials = [(name, kind) for name in [*names, "contact_1MPa.csv"] for kind in DAMAGES]
     rng.shuffle(trials)
     for name, kind in trials:
         if clock.left() < 0:

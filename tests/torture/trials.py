@@ -149,7 +149,8 @@ def wounds(folder: Path) -> str:
     except (OSError, ValueError, KeyError) as error:
         return f"half a file: {error}"
     for speed in rows:
-        for name in (f"profile_1_{speed}.csv", f"section_1_{speed}.vtu"):
+        at = f"1MPa_{'in' if speed.startswith('-') else 'out'}_{speed.lstrip('-')}mm_s"
+        for name in (f"profile_{at}.csv", f"section_{at}.vtu"):
             path = folder / name
             if not path.exists() or not path.read_text().rstrip().endswith(
                 ("\n", ">", *"0123456789")

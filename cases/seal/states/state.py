@@ -191,8 +191,9 @@ class FilmRow(Row):
 
     @property
     def name(self) -> str:
-        """Sealed pressure and rod speed."""
-        return f"{number_text(self.sealed_pressure_MPa)}_{number_text(self.rod_speed_mm_s)}"
+        """Sealed pressure, stroke and rod speed |U|: "1MPa_out_100mm_s"."""
+        speed = f"{self.stroke}_{number_text(abs(self.rod_speed_mm_s))}mm_s"
+        return f"{number_text(self.sealed_pressure_MPa)}MPa_{speed}"
 
     @property
     def order(self) -> tuple[float, bool, float]:
@@ -279,6 +280,11 @@ class ContactState:
     x_mm: Array
     p_MPa: Array
     section: Section
+
+
+def contact_name(sealed_pressure: float) -> str:
+    """Name of the files of a dry contact at a sealed pressure [MPa], without the suffix."""
+    return f"contact_{number_text(sealed_pressure)}MPa"
 
 
 def operating_point(sealed_pressure: float, stroke: str) -> dict[str, Any]:

@@ -13,8 +13,9 @@ from softehl.cases.seal.states.state import (
     FilmState,
     Profile,
     Section,
+    contact_name,
 )
-from softehl.runtime.io import number_text, read_columns, read_vtu
+from softehl.runtime.io import read_columns, read_vtu
 
 
 def report_contact(observer: Observer, state: ContactState) -> None:
@@ -22,7 +23,7 @@ def report_contact(observer: Observer, state: ContactState) -> None:
     if report := getattr(observer, "contact_state", None):
         report(state)
         return
-    name = f"contact_{number_text(state.sealed_pressure)}"
+    name = contact_name(state.sealed_pressure)
     columns = {"x_mm": state.x_mm, "p_MPa": state.p_MPa}
     observer.files({f"{name}.csv": columns, f"{name}.vtu": state.section})
 
