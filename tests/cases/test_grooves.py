@@ -31,6 +31,7 @@ from softehl.cases.shipped import SHIPPED
 
 
 METRIC = {
+    **{1.6: (1.3, 2.1), 2.4: (2.05, 3.2), 2.7: (2.3, 3.6), 3.6: (3.15, 4.8), 5.7: (5.0, 7.2)},
     **{1.8: (1.45, 2.4), 2.0: (1.65, 2.7), 2.65: (2.25, 3.6), 3.0: (2.6, 4.0), 3.55: (3.1, 4.8)},
     **{4.0: (3.5, 5.2), 5.0: (4.4, 6.6), 5.3: (4.7, 7.1), 6.0: (5.3, 7.4), 7.0: (6.1, 9.5)},
 }
@@ -63,8 +64,16 @@ def test_glands_of_metric_sections() -> None:
             found = gland(section, kind)
             assert (found.depth, found.width) == (depth, width)
             assert not found.by_rule
-    for section in METRIC:
+    for section in set(METRIC) & set(PNEUMATIC):
         assert squeeze(section, PNEUMATIC[section][0]) < squeeze(section, METRIC[section][0])
+
+
+def test_inch_and_metric_charts_of_two_makers_agree() -> None:
+    metric = {1.78: (1.45, 2.4), 2.62: (2.25, 3.6), 3.53: (3.1, 4.8), 5.33: (4.7, 7.1)}
+    for section, (depth, width) in {**metric, 6.99: (6.1, 9.5)}.items():
+        found = gland(section)
+        assert found.depth == pytest.approx(depth, rel=0.02)
+        assert found.width == pytest.approx(width, rel=0.024)
 
 
 def test_glands_of_x_rings_are_deeper_and_narrower() -> None:

@@ -284,7 +284,7 @@ def test_a_row_is_read_back_as_it_was() -> None:
 def test_key_names_and_order() -> None:
     rows = [Fall(height, 0.0, 0.6, 3, OK) for height in (-3.0, 1.5, 2.0)]
     assert [one.key for one in sorted(rows, key=lambda r: r.order)] == [2.0, 1.5, -3.0]
-    assert rows[1].file_names() == ("path_1.5.csv",)
+    assert rows[1].file_names() == ("path_1.5m.csv",)
     assert Fall.file_patterns() == ("path_*.csv",)
     assert (Fall.label(1.5), FilmRow.label(400.0)) == ("H = 1.5 m", "U = +400 mm/s")
 

@@ -5,7 +5,8 @@
 - Inch O-rings, "dynamic": the common chart of makers' handbooks for reciprocating seals (e.g.
   Apple Rubber's design guide, table A).
 - Metric O-rings, "dynamic": a maker's chart of housing dimensions (orings.co.uk, O-ring housing);
-  widths there have +0.25 mm.
+  widths there have +0.25 mm. Its rows for inch sections differ from the inch chart by at most 1.9 %
+  in depth and 2.3 % in width.
 - "pneumatic": a maker's chart for pneumatic, dynamic use (rhondamaseals.co.uk, groove sizes), with
   about half the squeeze.
 - 8.4 mm, "dynamic": the groove of JIS B 2401-2.
@@ -56,7 +57,7 @@ def gland(section_diameter: float, kind: Kind = "dynamic", section: str = "round
     chart = _chart("x_ring" if section == "x_ring" else round_rings)
     nearest = min(chart, key=lambda g: abs(g.section_diameter - section_diameter))
     # ISO 3601 and AS568 have the same grooves for sections to 1.2 % apart, 2.65 and 2.62 mm
-    if abs(section_diameter - nearest.section_diameter) <= 0.03 * nearest.section_diameter:
+    if abs(section_diameter - nearest.section_diameter) <= 0.015 * nearest.section_diameter:
         return nearest
     for below, above in pairwise(chart):
         if below.section_diameter < section_diameter < above.section_diameter:

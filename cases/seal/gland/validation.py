@@ -150,11 +150,15 @@ def _seal_is_squeezed(p: Gland) -> None:
     if p.piston:
         between, keys = "bore and ground of the groove", "bore, groove_diameter"
     if not 0.5 * p.section_diameter < p.depth < p.section_diameter:
+        way = 'give groove_depth or squeeze, or gland = "dynamic" gives a groove'
+        if p.section == "u_cup" and not p.ring:
+            slides = abs(p.rod_diameter)
+            groove = slides + (-10.0 if p.piston else 10.0)
+            way = f'name the U-cup by its groove, as in ring = "U-cup {slides:g}x{groove:g}x8"'
         raise ValueError(
             f"the gap between {between} is {p.depth:g} mm ({keys}); "
             f"to squeeze the seal it must be between a half and one section_diameter, "
-            f"{0.5 * p.section_diameter:g} to {p.section_diameter:g} mm; give groove_depth or "
-            'squeeze, or gland = "dynamic" gives a groove'
+            f"{0.5 * p.section_diameter:g} to {p.section_diameter:g} mm; {way}"
         )
 
 

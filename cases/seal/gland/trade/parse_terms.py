@@ -11,6 +11,7 @@ from typing import Any
 
 from softehl.cases.harness.parameters import Parameters, key
 from softehl.cases.harness.units import is_quantity
+from softehl.cases.seal.gland.grooves import KINDS
 from softehl.cases.seal.gland.key_values import number, put
 from softehl.cases.seal.gland.trade.finish_names import RMS_OF_RA, read_finish
 from softehl.cases.seal.gland.trade.fit_names import Band, read_fit
@@ -60,6 +61,7 @@ class SaidKeys(Parameters):
             terms += _finishes(values)
         _oil(values)
         _require_stroke(values.get("stroke"))
+        _require_gland(values.get("gland"))
         if isinstance(section := values.get("section"), str):
             values["section"] = read_section(section)
         return super().worded({**values, "said": tuple(dict.fromkeys(terms))} if terms else values)
@@ -133,6 +135,23 @@ def _require_stroke(value: object) -> None:
     for stroke, pattern in _STROKES.items():
         if isinstance(value, str) and re.fullmatch(pattern, plain(value), re.IGNORECASE):
             raise refused("stroke", value, "is another word for it", stroke)
+
+
+def _require_gland(value: object) -> None:
+    """Raise NotUnderstoodError for a standard, or for a use, whose grooves are not known here."""
+    if not isinstance(value, str) or value in KINDS:
+        return
+    if re.search(r"ISO|BS|DIN|JIS|GB|AS ?\d|MIL|SAE", plain(value), re.IGNORECASE):
+        why = (
+            "names a standard: rings of JIS B 2401 have its groove by themselves, those of other "
+            "standards (ISO 3601-2, BS 4518) are not in the catalogue; give groove_depth and "
+            "groove_width"
+        )
+    elif re.fullmatch(r"static.*|flange|face|axial|rotary.*|oscillating", plain(value), re.I):
+        why = "is no groove of a reciprocating seal"
+    else:
+        return
+    raise refused("gland", value, why, "dynamic", "pneumatic")
 
 
 def _length(name: str, values: dict[str, Any], piston: bool) -> list[str]:

@@ -106,9 +106,14 @@ _INCH = form(rf"{_INCHES} ?x ?{_INCHES}(?: ?x ?{_INCHES})?")
 _COMPOUND = form(
     r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM)[ -]?\d\d\b.*)"
 )
+_COMPOUND_FIRST = form(
+    r"(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM|Viton)[ -]?\d\d)[ ,;/-]+"
+    r"(?P<ring>.*\d.*)"
+)
 _POLYMER = form(
     r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM|Viton)\b.*)"
 )
+_SWOLLEN = form(r"\b(?:pre-?)?(?:swollen|swelled|swell(?:ing)?|aged)\b")
 _SIZE = form(
     rf"(?:\d{{3}}[AB][ -]+)?(?:ID|d1)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?x(?P<section>{NUMBER})"
     rf" ?(?:mm)?(?:x(?P<third>{NUMBER}) ?(?:mm)?)?(?:[ -]+[GA])?(?:[ -]+(?:N|S|CS))?"
@@ -122,7 +127,7 @@ _WORDS = form(
 def read_ring(name: str) -> RingName:
     """The ring of a name.  Raises NotUnderstoodError."""
     text = plain(name)
-    if match := _COMPOUND.fullmatch(text):
+    if match := _COMPOUND.fullmatch(text) or _COMPOUND_FIRST.fullmatch(text):
         rubber = read_rubber("ring", match["rubber"])
         return replace(
             read_ring(match["ring"]), rubber=rubber.text if rubber else None, standard=None
@@ -187,7 +192,7 @@ def _by_series(text: str) -> RingName | None:
         code = match["letter"].upper() + match["size"].upper()
         return RingName(code=code, rubber=_JIS_RUBBERS.get(kind), standard=standard)
     if match := _BS_4518.fullmatch(text):
-        return RingName(inner=0.1 * int(match["inner"]), section=0.1 * int(match["section"]))
+        return RingName(inner=int(match["inner"]) / 10, section=int(match["section"]) / 10)
     return None
 
 
@@ -229,6 +234,9 @@ def _without_kind(text: str) -> tuple[str, Kind | None]:
 
 def _unknown(name: str, remainder: str, kind: Kind | None) -> Exception:
     usual = ("36x4", "ISO 3601 50.4x3.55", "AS568-226")
+    if match := _SWOLLEN.search(remainder):
+        why = 'has its state in it, which is another key: swelling = "8 %" (by volume)'
+        return refused("ring", name, why, " ".join(_SWOLLEN.sub(" ", remainder).split()))
     if match := _POLYMER.fullmatch(remainder):
         why = "has its rubber in it, which is another key: material, polymer and hardness"
         return refused("ring", name, why, match["ring"].strip(" ,;-/"))
