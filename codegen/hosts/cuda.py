@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softehl.codegen import pipeline
 from softehl.codegen.emit.device import header
+from softehl.codegen.emit.device.kernels import DeviceKernels
 from softehl.codegen.graph.evaluation import State
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts.c_library import LIMIT
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.registry import Host
 from softehl.codegen.hosts.test_states import Sample, samples
+from softehl.device_arrays import by_blocks, numbered, sparse_pattern
+
+Fields = tuple[tuple[str, ...], tuple[int, ...]]
 
 
 def folder(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
@@ -26,6 +32,7 @@ def folder(interface: ElementInterface, states: Sequence[State]) -> dict[str, st
     places = np.round(np.array([[float(x) for x in node] for node in element.nodes]), 9)
     first = samples(interface, kernel, states)
     d = interface.definition
+    fields = _fields(kernels, places)
     substitutions: dict[str, object] = {
         "name": d.name,
         "NAME": d.name.upper(),
@@ -34,15 +41,19 @@ def folder(interface: ElementInterface, states: Sequence[State]) -> dict[str, st
         "threads": kernels.threads,
         "line": kernels.q,
         "dimension": kernels.D,
-        "components": kernels.C,
-        "nodes": kernels.nodes,
+        "fields": fields,
+        "shape": f"(nodes, {kernels.C})" if len(fields) == 1 else "(unknowns,)",
+        "nodes": d.nodes,
         "geometry": len(kernels.kept),
         "moduli": kernels.parent.size,
         "history": len(d.point_data),
         "symmetric": kernels.symmetric,
         "orders": tuple(kernels.orders),
         "own_order": kernels.n - 1,
-        "unknown_names": tuple(c.name for c in kernels.layout.components),
+        "unknown_names": ", ".join(c.name for c in kernels.components),
+        "functions": "\n\n".join(
+            inspect.getsource(f) for f in (numbered, sparse_pattern, by_blocks)
+        ),
         "parameter_names": {a.name: a.meaning for a in d.parameters},
         "history_names": {a.name: a.meaning for a in d.point_data},
         "node_order": [int(k) for k in np.lexsort(places.T)],
@@ -56,7 +67,7 @@ def folder(interface: ElementInterface, states: Sequence[State]) -> dict[str, st
         f"{d.name}.cu": kernels.text(),
         header.NAME: header.TEXT,
         header.FIBERS: header.FIBERS_TEXT,
-        "samples.json": _sample_file(interface, first, [c.name for c in kernels.layout.components]),
+        "samples.json": _sample_file(interface, first, fields),
     }
     for name, template in {
         f"{d.name}_cupy.py": "cuda_cupy.py.in",
@@ -73,13 +84,27 @@ def folder(interface: ElementInterface, states: Sequence[State]) -> dict[str, st
 CUDA = Host(element=folder)
 
 
+def _fields(kernels: DeviceKernels, places: NDArray[np.float64]) -> tuple[Fields, ...]:
+    """Names and nodes, x running first, of the fields of every order; of order 0 no nodes."""
+    found = list[Fields]()
+    for f in kernels.fields:
+        names = tuple(c.name for c in kernels.components[f.first : f.last])
+        of_first = [node for name, node in kernels.layout.d.dof_nodes if name == names[0]]
+        nodes = np.array([node for node in of_first if node is not None], dtype=int)
+        found.append((names, tuple(nodes[np.lexsort(places[nodes].T)].tolist())))
+    return (*found,)
+
+
 def _sample_file(
-    interface: ElementInterface, references: Sequence[Sample], components: Sequence[str]
+    interface: ElementInterface, references: Sequence[Sample], fields: Sequence[Fields]
 ) -> str:
-    """Values of one element with its unknowns node after node."""
+    """Values of one element, its unknowns as `Operator` has them."""
     d = interface.definition
     numbers = {place: k for k, place in enumerate(d.dof_nodes)}
-    order = [numbers[name, node] for node in range(d.nodes) for name in components]
+    order = list[int]()
+    for names, nodes in fields:
+        of_cell: list[int | None] = [*sorted(nodes)] or [None]
+        order += [numbers[name, node] for node in of_cell for name in names]
     size = len(order)
     values = []
     for s in references:

@@ -15,7 +15,7 @@ from softehl.codegen.emit.device import header
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import cache_dir
 from softehl.codegen.tools.page_evaluation import definition_of
-from softehl.device_source import DeviceSource
+from softehl.device_source import DeviceSource, NodalFields
 
 FLAGS = ("-O2", "-march=native", "-std=c++17", "-shared", "-fPIC", "-w")
 
@@ -40,7 +40,10 @@ def device_source(definition: Definition, real: str = "double") -> DeviceSource:
         elements=kernels.elements,
         threads=kernels.threads,
         dimension=kernels.D,
-        components=kernels.C,
+        fields=tuple(
+            NodalFields(tuple(c.name for c in kernels.components[f.first : f.last]), f.order)
+            for f in kernels.fields
+        ),
         line=kernels.q,
         geometry=len(kernels.kept),
         moduli=kernels.parent.size,

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from softehl.device_arrays import by_blocks, sparse_pattern
+from softehl.device_source import NodalFields
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.device import device_printer
 from softehl.runtime.device.device_module import DeviceModule, device_module
 from softehl.runtime.discretisation.element_blocks import ElementBlock
-from softehl.runtime.discretisation.matrix_free_products import (
-    by_components,
-    lexicographic,
-    require_product,
-)
+from softehl.runtime.discretisation.matrix_free_products import lexicographic
+from softehl.runtime.discretisation.p_multigrid import cell_of
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.mesh.cells import CELLS
 
@@ -29,13 +28,28 @@ def load_module(kernel: Kernel, device: str, real: str = "double") -> DeviceModu
     return device_module(device_printer.device_source(directory, kernel.name, real), device)
 
 
+def unknowns_by_order(kernel: Kernel, fields: Sequence[NodalFields]) -> list[Integers]:
+    """Numbers (nodes, components) of the unknowns of an element, x running first in the nodes."""
+    cell, found = CELLS[kernel.cell], []
+    numbers = {place: k for k, place in enumerate(kernel.places)}
+    for f in fields:
+        nodes: list[int | None] = [None]
+        if f.order:
+            lower = cell_of(cell, f.order)
+            distances = np.linalg.norm(cell.nodes[:, None] - lower.nodes[None], axis=2)
+            nodes = [*map(int, distances.argmin(axis=0)[lexicographic(lower)])]
+        found.append(np.array([[numbers[c, node] for c in f.components] for node in nodes]))
+    return found
+
+
 @dataclass(eq=False)
 class DeviceBlock:
     """Arrays of a block on a device, in the order of its kernels.
 
-    index: (n, nodes) places of the first unknown of each node in vectors. places: of its
-    coordinates in X, (m, dimension). history: (blocks, numbers, points of a block), or None. All
-    methods take and return arrays of the device; vectors have the unknowns of a node as neighbours.
+    index: (n, nodes) places of the first unknown of each node in vectors, those of each order of
+    the fields one after the other. places: of its coordinates in X, (m, dimension). history:
+    (blocks, numbers, points of a block), or None. All methods take and return arrays of the device;
+    vectors have the unknowns of a node as neighbours.
     """
 
     module: DeviceModule
@@ -51,15 +65,16 @@ class DeviceBlock:
         cls, block: ElementBlock, parameters: Array, module: DeviceModule, position: Integers
     ) -> DeviceBlock:
         """position: place of each unknown of the system in the vectors."""
-        kernel = require_product(block)
+        kernel, source, n = block.kernel, module.source, len(block.dofs)
+        assert isinstance(kernel, Kernel)
         order = lexicographic(CELLS[kernel.cell])
-        dofs = block.dofs[:, by_components(kernel)[order]]
-        X = block.coordinates.reshape(len(dofs), -1, module.source.dimension)[:, order]
-        nodes = np.arange(dofs.shape[0] * dofs.shape[1]).reshape(dofs.shape[:2])
+        first = np.concatenate([u[:, 0] for u in unknowns_by_order(kernel, source.fields)])
+        X = block.coordinates.reshape(n, -1, source.dimension)[:, order]
+        nodes = np.arange(X.shape[0] * X.shape[1]).reshape(X.shape[:2])
         return cls(
             module,
-            len(dofs),
-            module.array(position[dofs[:, :, 0]].astype(np.int32)),
+            n,
+            module.array(position[block.dofs[:, first]].astype(np.int32)),
             module.array((nodes * X.shape[2]).astype(np.int32)),
             module.real(X.reshape(-1, X.shape[2])),
             module.real(np.append(parameters, 0.0)),
@@ -82,11 +97,9 @@ class DeviceBlock:
             return None
         n, q, D, k = len(block.dofs), source.line, source.dimension, source.history
         assert block.point_data is not None
-        padded = np.zeros((source.blocks(n) * source.elements, *(q,) * D, k))
         axes = (0, *range(D, 0, -1), D + 1)
-        padded[:n] = block.point_data.reshape(n, *(q,) * D, k).transpose(axes)
-        grouped = padded.reshape(source.blocks(n), source.elements * source.points, k)
-        return module.real(grouped.transpose(0, 2, 1))
+        turned = block.point_data.reshape(n, *(q,) * D, k).transpose(axes)
+        return module.real(by_blocks(turned.reshape(n, source.points, k), source.elements))
 
     def _kept(self, numbers: int) -> Any:
         source = self.module.source
@@ -142,8 +155,8 @@ class SparsePattern:
     """Places of the entries of elements in a CSR matrix.
 
     low: (n, k) first unknown of each node; rows: (size + 1,) start of every row; slots: (n, k, k)
-    place of the second node among the neighbours of the first; all on the device. starts, columns:
-    of the matrix, on the host.
+    place in the row of the first node of the second one; all on the device. starts, columns: of the
+    matrix, on the host.
     """
 
     low: Any
@@ -158,23 +171,8 @@ class SparsePattern:
         return len(self.columns)
 
     @classmethod
-    def of(
-        cls, nodes: Integers, components: int, module: DeviceModule, size: int | None = None
-    ) -> SparsePattern:
-        """For elements with these nodes, (n, k), numbered from 0; size: number of all nodes."""
-        count, k = size or int(nodes.max()) + 1, nodes.shape[1]
-        i, j = np.repeat(nodes, k, axis=1).ravel(), np.tile(nodes, k).ravel()
-        pairs, inverse = np.unique(i.astype(np.int64) * count + j, return_inverse=True)
-        start = np.searchsorted(pairs, np.arange(count + 1) * count)
-        lengths = components * np.diff(start)
-        rows = np.concatenate([[0], np.cumsum(np.repeat(lengths, components))])
-        slots = (inverse - start[i]).reshape(len(nodes), k, k)
-        neighbours = (components * (pairs % count))[:, None] + np.arange(components)
-        blocks = [np.tile(neighbours[a:b].ravel(), components) for a, b in pairwise(start)]
-        return cls(
-            low=module.array((components * nodes).astype(np.int32)),
-            rows=module.array(rows.astype(np.int32)),
-            slots=module.array(slots.astype(np.uint16)),
-            starts=rows,
-            columns=np.concatenate(blocks),
-        )
+    def of(cls, nodes: Integers, first: Integers, module: DeviceModule) -> SparsePattern:
+        """For elements with these nodes, (n, k); first: (nodes + 1,) first unknown of each."""
+        rows, columns, slots = sparse_pattern(nodes, first)
+        low = first[nodes].astype(np.int32)
+        return cls(module.array(low), module.array(rows), module.array(slots), rows, columns)

@@ -123,8 +123,8 @@ def _pattern(
     lower = cell_of(CELLS[require_product(block).cell], order)
     dofs, components = levels.lower[block.name], levels.components
     first = dofs.reshape(len(dofs), -1, components)[:, lexicographic(lower), 0]
-    size = len(levels.unknowns[1]) // components
-    return SparsePattern.of(first // components, components, module, size)
+    unknowns = components * np.arange(len(levels.unknowns[1]) // components + 1)
+    return SparsePattern.of(first // components, unknowns, module)
 
 
 @dataclass(frozen=True, eq=False)

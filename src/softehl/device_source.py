@@ -6,14 +6,23 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
+class NodalFields:
+    """Components whose shape functions have one order."""
+
+    components: tuple[str, ...]
+    order: int
+
+
+@dataclass(frozen=True)
 class DeviceSource:
     """Text of the kernels of a page on a kind of cell; see `softehl.codegen.emit.device.kernels`.
 
     files: text by name of the file that is compiled, first, and of its headers. elements: of a
-    block of threads. dimension, components, line: of the cell, of a node, points along a line.
-    geometry, moduli: numbers of a point that `geometry` and `moduli` store. history: numbers of a
-    point. symmetric: whether the tangent is. orders: with which matrices are assembled. kernels:
-    name -> number of its arrays. real: type of NumPy of its numbers.
+    block of threads. dimension, fields, line: of the cell, of every order in the index of the
+    kernels, points along a line. geometry, moduli: numbers of a point that `geometry` and `moduli`
+    store. history: numbers of a point. symmetric: whether the tangent is. orders: with which
+    matrices are assembled. kernels: name -> number of its arrays. real: type of NumPy of its
+    numbers.
     """
 
     name: str
@@ -21,7 +30,7 @@ class DeviceSource:
     elements: int
     threads: int
     dimension: int
-    components: int
+    fields: tuple[NodalFields, ...]
     line: int
     geometry: int
     moduli: int

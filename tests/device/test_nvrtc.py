@@ -95,7 +95,8 @@ def test_nothing_is_spilled(cell: str, architecture: str, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("law", "cell"), [("plastic", "hex8"), ("viscous", "hex8"), ("advection", "quad9")]
+    ("law", "cell"),
+    [("plastic", "hex8"), ("viscous", "hex8"), ("advection", "quad9"), ("mixed", "hex27")],
 )
 def test_other_laws_are_compiled(law: str, cell: str, tmp_path: Path) -> None:
     found = figures(device_source(page(law).definition(cell)), "90", tmp_path)

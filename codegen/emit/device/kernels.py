@@ -16,20 +16,21 @@ lane.
     assembleP(n, kept, low, rows, slots, values)     B' S B with shape functions of the order P
 
 n: elements. parameters: constants. index (n, nodes): place in u, x and y of the first unknown of a
-node, x running first, then y, then z; the unknowns of a node are neighbours. places: the same for
-its coordinates in X. history, kept: (blocks, numbers, threads with a point), x running first in
-the points of an element. low (n, nodes of order P), rows: start of the row of every unknown in
-`values` of a CSR matrix; slots (n, nodes, nodes): place of the second node among the neighbours of
-the first.
+node, x running first, then y, then z; the unknowns of a node are neighbours. Fields of lower order
+have nodes of their own, behind those of the fields of higher order. places (n, nodes of the cell):
+the same for its coordinates in X. history, kept: (blocks, numbers, threads with a point), x running
+first in the points of an element. low (n, nodes of order P): number of the first unknown of a node.
+rows: start of the row of every unknown in `values` of a CSR matrix. slots (n, nodes, nodes): place
+in the row of the first unknown of the second node.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,15 @@ from softehl.codegen.emit import c_runtime, simd_printer, simd_routines
 from softehl.codegen.emit.c_printer import number
 from softehl.codegen.emit.code_motion import Schedule
 from softehl.codegen.emit.device import header
+from softehl.codegen.emit.device.assembly import AssemblyLoops
+from softehl.codegen.emit.device.block_sizes import (
+    DOUBLE,
+    SHARED,
+    BlockSizes,
+    Nodal,
+    node_of,
+    nodes_of,
+)
 from softehl.codegen.emit.points import parent_map, point_function, sum_factored_product
 from softehl.codegen.emit.points.btab import Parent, pull_back
 from softehl.codegen.emit.points.c_lines import Lines
@@ -52,20 +62,15 @@ from softehl.codegen.graph.graph import Routine
 from softehl.codegen.language.definition import Quantity, functions_of_user
 
 Part = tuple[PointOutputs, Schedule, tuple[Routine, ...]]
-THREADS = 256
-"""Threads of a block at most, where an element has no more points."""
-SHARED = 48_000
-"""Bytes of shared memory that a block may have without asking the driver."""
-DOUBLE = 8
 
 
 def require(layout: Layout) -> None:
     """Raise `TargetError` for a page that a device cannot run."""
     d, name = layout.d, layout.d.name
-    if not sum_factored_product.fits(layout):
+    if not sum_factored_product.has_lines(layout):
         raise TargetError(
-            f"{name} on {d.cell}: a device needs quadrilaterals or hexahedra, fields of the order "
-            "of the cell, and no values at the centroid"
+            f"{name} on {d.cell}: a device needs quadrilaterals or hexahedra whose shape functions "
+            "are products along lines, no values at the centroid and no history of terms"
         )
     if d.data or d.arrays or functions_of_user(d):
         kinds = "data of elements, tables, networks or external functions"
@@ -99,76 +104,10 @@ def single_precision(text: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class DeviceKernels:
+class DeviceKernels(BlockSizes):
     """Kernels of a layout; parts: outputs of its tasks at a point, in the printed order."""
 
-    layout: Layout
     parts: Mapping[str, Part]
-
-    # sizes --------------------------------------------------------------------------------------
-
-    @property
-    def D(self) -> int:
-        """Dimension."""
-        return self.layout.dimension
-
-    @cached_property
-    def C(self) -> int:
-        """Components."""
-        return len(self.layout.components)
-
-    @cached_property
-    def n(self) -> int:
-        """Nodes along a line."""
-        assert self.layout.geometry.line is not None
-        return len(self.layout.geometry.line.values[0])
-
-    @cached_property
-    def q(self) -> int:
-        """Points along a line."""
-        assert self.layout.geometry.line is not None
-        return len(self.layout.geometry.line.values)
-
-    @property
-    def m(self) -> int:
-        """Entries of a line in an array."""
-        return max(self.n, self.q)
-
-    @property
-    def row(self) -> int:
-        """Length of a line in shared memory, odd: neighbours lie in different banks."""
-        return self.m | 1
-
-    @property
-    def size(self) -> int:
-        """Entries of a component of an element in shared memory."""
-        return int(self.row * self.m ** (self.D - 1))
-
-    @property
-    def nodes(self) -> int:
-        """Nodes of an element."""
-        return int(self.n**self.D)
-
-    @property
-    def points(self) -> int:
-        """Points of an element."""
-        return int(self.q**self.D)
-
-    @cached_property
-    def elements(self) -> int:
-        """Elements of a block: as many as threads and shared memory hold."""
-        of_memory = SHARED // (DOUBLE * (2 + self.D) * max(self.C, self.D) * self.size)
-        return max(1, min(THREADS // self.points, of_memory))
-
-    @property
-    def owners(self) -> int:
-        """Threads that have a point."""
-        return self.elements * self.points
-
-    @property
-    def threads(self) -> int:
-        """Threads of a block."""
-        return -(-self.owners // 32) * 32
 
     @property
     def symmetric(self) -> bool:
@@ -196,27 +135,31 @@ class DeviceKernels:
 
     @cached_property
     def tables(self) -> dict[str, NDArray[np.float64]]:
-        """Places of points and nodes along a line, values, slopes at points, weights."""
+        """Places of points along a line, slopes there from values there, weights."""
         rule = self.layout.d.rule
         at = [float(p[-1]) for p in rule.points[: self.q]]
-        cell = sorted({float(x[0]) for x in ELEMENTS[self.layout.d.cell].nodes})
         weights = np.array([float(w) for w in rule.weights]).reshape((self.q,) * self.D)
         line = weights.sum(axis=tuple(range(self.D - 1))) / 2.0 ** (self.D - 1)
-        return {
-            "points": np.array(at),
-            "nodes": np.array(cell),
-            "to": lagrange(cell, at)[0],
-            "slope_of_nodes": lagrange(cell, at)[1],
-            "slope": lagrange(at, at)[1],
-            "weights": line,
-        }
+        return {"points": np.array(at), "slope": lagrange(at, at)[1], "weights": line}
+
+    def _shape(self, order: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Values and slopes (points, nodes) along a line of the shape functions of an order."""
+        nodes = list(np.linspace(-1.0, 1.0, order + 1)) if order else [0.0]
+        if order == self.n - 1:
+            nodes = sorted({float(x[0]) for x in ELEMENTS[self.layout.d.cell].nodes})
+        return lagrange(nodes, list(self.tables["points"]))
 
     # the file -----------------------------------------------------------------------------------
 
     @property
     def orders(self) -> list[int]:
-        """Orders with which matrices are assembled: the next one of multigrid, and the own one."""
+        """Orders with which matrices are assembled: the next one of multigrid, and the own one.
+
+        Fields of several orders have no multigrid.
+        """
         own = self.n - 1
+        if len(self.fields) > 1:
+            return [own] if own <= 2 else []
         next_lower = 2 if own % 2 == 0 and own > 2 else 1
         return sorted({next_lower, own}) if own <= 2 else [next_lower]
 
@@ -247,7 +190,9 @@ class DeviceKernels:
     def _functions(self) -> list[str]:
         """Tables and functions in front of the kernels."""
         stem, tables = self.layout.d.name, self.tables
-        lines = {"to": Table(tables["to"], 1), "slope": Table(tables["slope"], -1)}
+        orders = sorted({self.n - 1, *(f.order for f in self.fields)})
+        lines = {f"to{order}": Table(self._shape(order)[0], 1) for order in orders}
+        lines["slope"] = Table(tables["slope"], -1)
         texts = [
             one_lane(sweep(f"{abi.function_name(stem, label)}_{kind}", table, kind))
             for label, table in lines.items()
@@ -265,16 +210,14 @@ class DeviceKernels:
         texts += map(one_lane, functions)
         weights = ", ".join(number(float(w)) for w in tables["weights"])
         texts.append(f"TABLE V weights[{self.q}] = {{{weights}}};\n")
-        for order in self.orders:
+        for order in sorted({f.order for at in self.orders for f in self._assembled(at)}):
             texts.append(_table(f"basis_of_{order}", self.basis(order)))
-        return [*texts, *self._squares()]
+        return [*texts, *(t for f in self.fields for t in self._squares(f.order))]
 
     def basis(self, order: int) -> NDArray[np.float64]:
         """Values and parent slopes (points, nodes, 1 + D) of an order, x running first."""
-        own = order == self.n - 1
-        nodes = list(self.tables["nodes"] if own else np.linspace(-1.0, 1.0, order + 1))
-        N, M = lagrange(nodes, list(self.tables["points"]))
-        k, D = len(nodes), self.D
+        N, M = self._shape(order)
+        k, D = order + 1, self.D
         q = np.unravel_index(np.arange(self.points), (self.q,) * D)
         a = np.unravel_index(np.arange(k**D), (k,) * D)
         values = [N[np.ix_(q[D - 1 - i], a[D - 1 - i])] for i in range(D)]
@@ -284,17 +227,17 @@ class DeviceKernels:
             columns.append(np.prod([slopes[i] if i == m else values[i] for i in range(D)], axis=0))
         return np.stack(columns, axis=-1)
 
-    def _squares(self) -> Iterable[str]:
+    def _squares(self, order: int) -> Iterable[str]:
         """Functions that sum products of shape functions, and slopes, along a line to the nodes."""
-        N, M = self.tables["to"], self.tables["slope_of_nodes"]
+        N, M = self._shape(order)
         for kind, table in (("NN", N * N), ("MM", M * M), ("NM", N * M)):
             lines = [f"    const V a{k} = a[{k} * step];" for k in range(self.q)]
-            for i in range(self.n):
+            for i in range(order + 1):
                 terms = [f"{number(float(table[k, i]))} * a{k}" for k in range(self.q)]
                 lines.append(f"    b[{i} * step] = {' + '.join(terms)};")
             head = "const V *restrict a, V *restrict b, const int step"
             body = "\n".join(lines)
-            yield f"DEVICE void squares_{kind}({head})\n{{\n{body}\n}}\n"
+            yield f"DEVICE void squares_{kind}{order}({head})\n{{\n{body}\n}}\n"
 
     def _kernel(self, name: str, arguments: str, out: Lines) -> str:
         body = "\n".join(out.lines)
@@ -323,23 +266,26 @@ class DeviceKernels:
         return (1, self.row, self.row * self.m)[axis]
 
     def _lines(
-        self, out: Lines, function: str, source: str, target: str, axis: int, components: int
+        self, out: Lines, function: str, source: str, target: str, axis: int, f: Nodal
     ) -> None:
-        """Apply a function to all lines along an axis, from an array to another."""
+        """Apply a function to all lines of components along an axis, from an array to another."""
         m, others = self.m, [self._step(a) for a in range(self.D) if a != axis]
         each = m ** (self.D - 1)
-        out.open(f"THREADS(l, {components * self.elements * each}, {self.threads})")
+        out.open(f"THREADS(l, {f.count * self.elements * each}, {self.threads})")
         places = [f"l / {m**k} % {m} * {step}" for k, step in enumerate(others)]
+        if f.first:
+            places.append(str(f.first * self.elements * self.size))
         out.add(f"const int at = l / {each} * {self.size} + {' + '.join(places)};")
         out.add(f"{function}(&{source}[at], &{target}[at], {self._step(axis)});")
         out.close()
 
-    def _sweeps(self, out: Lines, label: str, axes: Iterable[int], components: int) -> None:
+    def _sweeps(self, out: Lines, kind: str, axes: Iterable[int], fields: Sequence[Nodal]) -> None:
         """All directions, one after the other, from s0; the last array is `_last`."""
         names = ["s0", "s1"]
         for axis in axes:
-            function = f"{abi.function_name(self.layout.d.name, label)}"
-            self._lines(out, function, names[0], names[1], axis, components)
+            for f in fields:
+                function = abi.function_name(self.layout.d.name, f"to{f.order}_{kind}")
+                self._lines(out, function, names[0], names[1], axis, f)
             out.add("SYNC")
             names.reverse()
 
@@ -353,7 +299,7 @@ class DeviceKernels:
 
         A thread reads and writes the same places where there are as many nodes as points.
         """
-        if read and self._last == "s0" and self.n != self.q:
+        if read and self._last == "s0" and {f.n for f in self.fields} != {self.q}:
             out.add("SYNC")
 
     def _position(self, out: Lines, width: int, letter: str) -> None:
@@ -362,49 +308,58 @@ class DeviceKernels:
         places = [f"{letter} / {width**k} % {width} * {self._step(k)}" for k in axes]
         out.add(f"const int at = e * {self.size} + {' + '.join(places)};")
 
-    def _to_points(self, out: Lines, vector: str, index: str, components: int) -> None:
+    def _to_points(self, out: Lines, vector: str, index: str, fields: Sequence[Nodal]) -> None:
         """Values of a vector from the nodes to the points, in `_last`, and slopes there, in sl."""
-        full = components * self.elements * self.size
-        out.open(f"THREADS(l, {self.elements * self.nodes}, {self.threads})")
-        out.add(f"const int e = l / {self.nodes}, a = l % {self.nodes};")
-        self._position(out, self.n, "a")
-        element = f"block * {self.elements} + e"
-        out.add(f"const int from = {element} < n ? {index}[({element}) * {self.nodes} + a] : -1;")
-        for c in range(components):
-            out.add(
-                f"s0[{c * self.elements * self.size} + at] = from < 0 ? 0 : {vector}[from + {c}];"
-            )
-        out.close()
+        every = Nodal(self.n - 1, 0, fields[-1].last)
+        full, total = every.last * self.elements * self.size, nodes_of(fields, self.D)
+        for f in fields:
+            self._nodes_of(out, f)
+            element = f"block * {self.elements} + e"
+            place = f"{index}[({element}) * {total} + {node_of(f, 'a')}]"
+            out.add(f"const int from = {element} < n ? {place} : -1;")
+            for c in range(f.first, f.last):
+                value = f"{vector}[from + {c - f.first}]"
+                out.add(f"s0[{c * self.elements * self.size} + at] = from < 0 ? 0 : {value};")
+            out.close()
         out.add("SYNC")
-        self._sweeps(out, "to_forth", range(self.D), components)
+        self._sweeps(out, "forth", range(self.D), fields)
         function = abi.function_name(self.layout.d.name, "slope_forth")
         for axis in range(self.D):
-            self._lines(out, function, self._last, f"(sl + {axis * full})", axis, components)
+            self._lines(out, function, self._last, f"(sl + {axis * full})", axis, every)
         out.add("SYNC")
+
+    def _nodes_of(self, out: Lines, f: Nodal) -> None:
+        """Open a loop over the nodes of an order of all elements."""
+        nodes = f.n**self.D
+        out.open(f"THREADS(l, {self.elements * nodes}, {self.threads})")
+        out.add(f"const int e = l / {nodes}, a = l % {nodes};")
+        self._position(out, f.n, "a")
 
     def _from_points(self, out: Lines, result: str) -> None:
         """Fluxes in sl, and of values in s0, to the nodes, added to a vector."""
-        full, function = self.C * self.elements * self.size, self.layout.d.name
+        full, name = self.C * self.elements * self.size, self.layout.d.name
         for axis in range(self.D):
             if axis:
                 out.add("SYNC")  # two threads may add to one place
-            name = abi.function_name(function, "slope_back")
-            self._lines(out, name, f"(sl + {axis * full})", "s0", axis, self.C)
+            function = abi.function_name(name, "slope_back")
+            for f in self.fields:
+                self._lines(out, function, f"(sl + {axis * full})", "s0", axis, f)
         # no barrier: the next sweep has the same lines on the same threads
-        self._sweeps(out, "to_back", reversed(range(self.D)), self.C)
+        self._sweeps(out, "back", reversed(range(self.D)), self.fields)
         self._to_nodes(out, result, self._last)
 
     def _to_nodes(self, out: Lines, result: str, source: str) -> None:
         """Values at the nodes in an array, added to a vector."""
-        out.open(f"THREADS(l, {self.elements * self.nodes}, {self.threads})")
-        out.add(f"const int e = l / {self.nodes}, a = l % {self.nodes};")
-        self._position(out, self.n, "a")
-        out.open(f"if (block * {self.elements} + e < n)")
-        out.add(f"const int to = index[(block * {self.elements} + e) * {self.nodes} + a];")
-        for c in range(self.C):
-            out.add(f"ADD({result} + to + {c}, {source}[{c * self.elements * self.size} + at]);")
-        out.close()
-        out.close()
+        for f in self.fields:
+            self._nodes_of(out, f)
+            out.open(f"if (block * {self.elements} + e < n)")
+            place = f"(block * {self.elements} + e) * {self.nodes} + {node_of(f, 'a')}"
+            out.add(f"const int to = index[{place}];")
+            for c in range(f.first, f.last):
+                value = f"{source}[{c * self.elements * self.size} + at]"
+                out.add(f"ADD({result} + to + {c - f.first}, {value});")
+            out.close()
+            out.close()
 
     def _own(self, out: Lines) -> None:
         """The point of a thread."""
@@ -447,14 +402,14 @@ class DeviceKernels:
                 out.add(f"MINE(frame, t)[{k}] = from[{k * self.owners}];")
             out.close()
         else:
-            self._to_points(out, "X", "places", self.D)
+            self._to_points(out, "X", "places", self._coordinates)
             self._own(out)
             self._map(out)
             for k, name in enumerate(self.kept):
                 out.add(f"MINE(frame, t)[{k}] = {name};")
             out.close()
             self._done_with_values(out, read=self._positions)
-        self._to_points(out, "u", "index", self.C)
+        self._to_points(out, "u", "index", self.fields)
         return needs
 
     def _at_points(self, array: str, count: int) -> str:
@@ -469,7 +424,7 @@ class DeviceKernels:
 
     def _fields(self, out: Lines, target: str, numbers: Iterable[int]) -> None:
         """Fields and gradients at the point; target: format of an entry by its number."""
-        components = {c: k for k, c in enumerate(self.layout.components)}
+        components = {c: k for k, c in enumerate(self.components)}
         for k in numbers:
             quantity = self.layout.form.all[k]
             c = components[quantity.component]
@@ -506,7 +461,7 @@ class DeviceKernels:
         """Fluxes at the point overwrite the arrays; all are not-a-number where it has failed."""
         places = {q: f"P[{k}]" for k, q in enumerate(self.layout.form.unknowns)}
         out.add("const V volume = failed ? (V)NAN : w;")
-        for k, c in enumerate(self.layout.components):
+        for k, c in enumerate(self.components):
             value = places.get(Quantity(c, None))
             text = f"volume * {value}" if value else "0"
             out.add(f"s0[{k * self.elements * self.size} + at] = {text};")
@@ -537,7 +492,7 @@ class DeviceKernels:
     def _geometry(self) -> str:
         out = Lines()
         self._shared(out, self.D)
-        self._to_points(out, "X", "places", self.D)
+        self._to_points(out, "X", "places", self._coordinates)
         self._own(out)
         self._map(out)
         out.add(f"V *const to = {self._at_points('kept', len(self.kept))};")
@@ -572,7 +527,7 @@ class DeviceKernels:
         out.close()
         form = self.layout.form
         self._done_with_values(out, read=any(form.all[k].axis is None for k in needs["dofs"]))
-        self._to_points(out, "x", "index", self.C)
+        self._to_points(out, "x", "index", self.fields)
         self._own(out)
         self._frame(out)
         self._arguments(out, Task.PRODUCT, needs)
@@ -610,10 +565,10 @@ class DeviceKernels:
     def _product_moduli(self, name: str, transposed: bool) -> str:
         out, parent = Lines(), self.parent
         self._shared(out)
-        self._to_points(out, "x", "index", self.C)
+        self._to_points(out, "x", "index", self.fields)
         self._own(out)
         out.add(f"const V *const from = {self._at_points('kept', parent.size)};")
-        components = {c: k for k, c in enumerate(self.layout.components)}
+        components = {c: k for k, c in enumerate(self.components)}
         label = {
             q: f"{components[q.component]}{'v' if q.axis is None else q.axis}"
             for q in parent.quantities
@@ -653,7 +608,7 @@ class DeviceKernels:
         full = self.C * self.elements * self.size
         groups: dict[tuple[int | None, int | None], list[tuple[int, str]]] = {}
         axes: list[int | None] = [None, *range(self.D)]
-        for c, k in ((c, k) for k, c in enumerate(self.layout.components)):
+        for c, k in ((c, k) for k, c in enumerate(self.components)):
             for a, b in combinations_with_replacement(axes, 2):
                 pairs = {(a, b), (b, a)}
                 numbers = [parent.number(Quantity(c, i), Quantity(c, j)) for i, j in pairs]
@@ -677,7 +632,9 @@ class DeviceKernels:
             names = ["s0", "s1"]
             for axis in range(self.D):
                 kind = ("NN", "NM", "MM")[(a == axis) + (b == axis)]
-                self._lines(out, f"squares_{kind}", names[0], names[1], axis, self.C)
+                for f in self.fields:
+                    function = f"squares_{kind}{f.order}"
+                    self._lines(out, function, names[0], names[1], axis, f)
                 out.add("SYNC")
                 names.reverse()
             out.open(f"THREADS(l, {full}, {self.threads})")
@@ -689,111 +646,26 @@ class DeviceKernels:
             "diagonal", "const V *restrict kept, const int *restrict index, V *restrict y", out
         )
 
+    def _assembled(self, order: int) -> list[Nodal]:
+        """Fields of a matrix of an order."""
+        return self.fields if len(self.fields) > 1 else [Nodal(order, 0, self.C)]
+
     def _assemble(self, order: int) -> str:
         """B' S B of some elements at a time; a thread has a column of an element, or a part."""
-        out, parent, C = Lines(), self.parent, self.C
-        k = (order + 1) ** self.D
-        wide = parent.size | 1
+        out, fields = Lines(), self._assembled(order)
+        wide = self.parent.size | 1
         each = max(1, min(self.elements, SHARED // (DOUBLE * wide * self.points)))
         slice_points = self.points
         while DOUBLE * wide * slice_points * each > SHARED:  # the points in slices, of one element
             slice_points = -(-slice_points // 2)
         out.add(f"SHARED V S[{each * slice_points}][{wide}];")
-        parts = max(1, min(k, self.threads // (C * k * each), -(-C * k // 24)))
-        parts = max(parts, -(-C * k // 96))
-        rows = -(-k // parts)
-        columns = C * each * k * parts
-        rounds = -(-columns // self.threads)
-        out.open(f"for (int some = 0; some < {self.elements}; some += {each})")
-        out.open(f"for (int turn = 0; turn < {rounds}; ++turn)")
-        out.add(f"OWNED(V, sums, {C * rows}, {self.threads});")
-        whole = f"for (int first = 0; first < {self.points}; first += {slice_points})"
-        out.open(whole)
-        out.add("SYNC")
-        out.open(f"THREADS(l, {each * slice_points * parent.size}, {self.threads})")
-        out.add(f"const int p = l % {each * slice_points}, number = l / {each * slice_points};")
-        out.add(f"const int e = p / {slice_points}, q = first + p % {slice_points};")
-        out.add(
-            f"const long long at = ((long long)block * {parent.size} + number) * {self.owners} "
-            f"+ (some + e) * {self.points} + q;"
-        )
-        out.add(f"S[p][number] = some + e < {self.elements} && q < {self.points} ? kept[at] : 0;")
-        out.close()
-        out.add("SYNC")
-        out.open(f"OWN(l, {self.threads})")
-        out.open(f"if (turn * {self.threads} + l < {columns})")
-        self._column(out, k, each, parts)
-        out.add("V *const r = MINE(sums, l);")
-        out.add(f"UNROLL for (int i = 0; first == 0 && i < {C * rows}; ++i) r[i] = 0;")
-        out.add(
-            f"const int last = {self.points} - first < {slice_points} "
-            f"? {self.points} - first : {slice_points};"
-        )
-        for j in range(C):
-            out.open(f"{'else ' if j else ''}if (c == {j})")
-            out.open("for (int p = 0; p < last; ++p)")
-            out.add(f"const V *const N = basis_of_{order}[first + p][b];")
-            out.add(f"const V *const s = S[e * {slice_points} + p];")
-            used = self._half_column(out, j)
-            out.open(f"UNROLL for (int a = 0; a < {rows}; ++a)")
-            out.add(f"const int node = part * {rows} + a;")
-            out.open(f"if (node < {k})")
-            out.add(f"const V *const B = basis_of_{order}[first + p][node];")
-            for i, terms in used.items():
-                total = " + ".join(f"{name} * B[{at}]" for at, name in terms)
-                out.add(f"r[{C} * a + {i}] += {total};")
-            out.close()
-            out.close()
-            out.close()
-            out.close()
-        out.close()
-        out.close()
-        out.close()
-        out.open(f"OWN(l, {self.threads})")
-        out.open(f"if (turn * {self.threads} + l < {columns})")
-        self._column(out, k, each, parts)
-        out.add(f"const int el = block * {self.elements} + some + e;")
-        out.add("const V *const r = MINE(sums, l);")
-        out.open(f"if (some + e < {self.elements} && el < n)")
-        out.open(f"UNROLL for (int a = 0; a < {rows}; ++a)")
-        out.add(f"const int node = part * {rows} + a;")
-        out.open(f"if (node < {k})")
-        out.add(f"const long long pair = ((long long)el * {k} + node) * {k} + b;")
-        out.add(f"const int row = low[el * {k} + node], place = {C} * slots[pair] + c;")
-        for i in range(C):
-            out.add(f"ADD(values + rows[row + {i}] + place, r[{C} * a + {i}]);")
-        for _ in range(7):
-            out.close()
+        for rows, columns in product(fields, repeat=2):
+            AssemblyLoops(self, self.parent, out, fields, rows, columns, each, slice_points).write()
         arguments = (
             "const V *restrict kept, const int *restrict low, const int *restrict rows, "
             "const unsigned short *restrict slots, V *restrict values"
         )
         return self._kernel(f"assemble{order}", arguments, out)
-
-    def _column(self, out: Lines, k: int, each: int, parts: int) -> None:
-        """Component c, node b, element e and part of the rows of a thread."""
-        out.add(f"const int own = turn * {self.threads} + l;")
-        out.add(f"const int c = own / {each * k * parts}, b = own % {k};")
-        out.add(f"const int e = own / {k} % {each}, part = own / {k * each} % {parts};")
-
-    def _half_column(self, out: Lines, j: int) -> dict[int, list[tuple[int, str]]]:
-        """S B of a column of the component j: component of the rows -> place in B and a name."""
-        parent, components = self.parent, self.layout.components
-        column = components[j]
-        of_rows: dict[int, list[tuple[int, str]]] = {}
-        for i, c in enumerate(components):
-            for q in parent.of(c):
-                terms = []
-                for o in parent.of(column):
-                    entry = parent.number(q, o)
-                    if entry is not None:
-                        terms.append(f"s[{entry}] * N[{0 if o.axis is None else 1 + o.axis}]")
-                if terms:
-                    at = 0 if q.axis is None else 1 + q.axis
-                    name = f"T{i}{at}"
-                    out.add(f"const V {name} = {' + '.join(terms)};")
-                    of_rows.setdefault(i, []).append((at, name))
-        return of_rows
 
 
 _OF_STATE = (

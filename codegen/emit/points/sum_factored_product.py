@@ -203,13 +203,17 @@ def scatter(components: int, nodes: int) -> list[str]:
 
 def fits(layout: Layout) -> bool:
     """True if a model has a product by sum factorisation on its cell."""
+    return has_lines(layout) and {c.order for c in layout.components} == {layout.geometry.order}
+
+
+def has_lines(layout: Layout) -> bool:
+    """True if sums over the points of the cell go along lines, and no value is at the centroid."""
     shape, cell = layout.geometry, layout.d.cell
     if layout.form.centroid or layout.d.term_history:
         return False
     if shape.line is None or not cell.startswith(("quad", "hex")) or layout.dimension < 2:
         return False
-    orders = {c.order for c in layout.components}
-    return orders == {shape.order} and len(shape.line.values) >= len(shape.line.values[0])
+    return len(shape.line.values) >= len(shape.line.values[0])
 
 
 @dataclass(frozen=True, eq=False)

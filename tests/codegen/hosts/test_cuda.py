@@ -24,7 +24,12 @@ def definition(law: str, cell: str) -> Definition:
     return found
 
 
-SLOW = [("neo_hooke", "hex27"), ("plastic", "hex8"), ("advection", "quad9")]
+SLOW = [
+    ("neo_hooke", "hex27"),
+    ("plastic", "hex8"),
+    ("advection", "quad9"),
+    ("convection", "quad9"),
+]
 
 
 @pytest.mark.parametrize(
