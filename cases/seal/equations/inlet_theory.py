@@ -7,13 +7,15 @@ scales l, K sqrt(l), K l^1.5 / E* one problem is left, with a pressure P(X) and 
     H' = -(2/pi) PV int P(S) / (X - S) dS,    P' = -exp(A P) (H - H*) / H^3,
 
 P -> sqrt(-X)(1 + B X) inside, with A = alpha K sqrt(l) and B = b l. It has a solution for one H*
-(Snoeijer, Eggers, Venner: Phys. Fluids 25, 101705, 2013). `local_inlet` solves it.
+(Snoeijer, Eggers, Venner: Phys. Fluids 25, 101705, 2013). `local_inlet` solves it. An oil that
+thins under shear leaves one parameter more, its critical stress over eta U / (K l^1.5 / E*).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import exp, log
 
 import numpy as np
@@ -55,19 +57,32 @@ class Edge:
         """Length l = (6 eta U E*^2 / K^3)^(2/5) of the inlet, mm; flow: eta U, MPa mm."""
         return float((6.0 * flow * self.modulus**2 / self.rise**1.5) ** 0.4)
 
-    def h_star(self, flow: float, alpha: float = 0.0) -> float:
+    def thickness(self, flow: float) -> float:
+        """Unit K l^1.5 / E* of the film thickness, mm; flow: eta U, MPa mm."""
+        return float(self.rise**0.5 * self.length(flow) ** 1.5 / self.modulus)
+
+    def h_star(self, flow: float, alpha: float = 0.0, oil: ThinningOil | None = None) -> float:
         """Film thickness h*, mm.
 
         Parameters
         ----------
         flow : float
-            eta |U| with the viscosity at the pressure before the inlet, MPa mm.
+            eta |U| with the viscosity at rest at the pressure before the inlet, MPa mm.
         alpha : float
             Pressure-viscosity coefficient, 1/MPa.
+        oil : ThinningOil, optional
+            Oil that thins under shear, its critical stress in MPa.
+
+        Raises
+        ------
+        ArithmeticError
+            If the oil thins more than the local problem can be solved for.
         """
         length = self.length(flow)
         viscosity, curvature = alpha * (self.rise * length) ** 0.5, self.curvature * length
         plain = FACTOR * flow**0.6 * self.modulus**0.2 * self.rise**-0.4
+        if oil is not None:
+            plain *= thinned(replace(oil, critical=oil.critical * self.thickness(flow) / flow))
         return float(plain * (1.0 + BY_VISCOSITY * viscosity) * (1.0 + BY_CURVATURE * curvature))
 
 
@@ -99,6 +114,73 @@ def incremental_modulus(stiffness: Stiffness, along: float, hoop: float) -> floa
     return float(2.0 * gamma * (P * S**2 - (1.0 - P) ** 2) / S)
 
 
+# --- an oil that thins under shear --------------------------------------------------------------
+
+_Y, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+"""Points and weights across the film."""
+
+
+@dataclass(frozen=True)
+class ThinningOil:
+    """Oil that thins under shear.
+
+    Attributes
+    ----------
+    critical : float
+        Critical stress; in the local problem over eta U / (K l^1.5 / E*).
+    exponent, plateau : float or None
+        n and c of Carreau's law; None for Eyring's.
+    """
+
+    critical: float
+    exponent: float | None = None
+    plateau: float = 0.0
+
+    def rate(self, stress: Array) -> Array:
+        """Shear rate of a stress >= 0, both over those of a Newtonian oil; relative error 1e-5."""
+        ratio = stress / self.critical
+        if self.exponent is None:
+            return np.asarray(self.critical * np.sinh(np.minimum(ratio, 300.0)))
+        rates, stresses = _carreau_curve(self.exponent, self.plateau)
+        logarithm = np.interp(np.log(np.maximum(ratio, 1e-300)), stresses, rates)
+        beyond = np.where(ratio < exp(stresses[0]), ratio, np.exp(logarithm))
+        return np.asarray(self.critical * beyond)
+
+    def resistance(self, H: Array, slope: Array, viscosity: Array) -> Array:
+        """Viscosity (n,) that a pressure gradient P' meets in a film H that the rod shears.
+
+        The stress tau = tau_m - 6 P' Y is linear across the film, tau_m gives the speed of the rod
+        (codegen/models/rheology.py). viscosity: at rest, of the pressure.
+        """
+        middle, drop = viscosity / H, np.maximum(3.0 * np.abs(slope) * H, 1e-5 * viscosity / H)
+
+        def rates(tau_m: Array) -> Array:
+            tau = tau_m[:, None] - drop[:, None] * _Y
+            return np.asarray(np.sign(tau) * self.rate(np.abs(tau)) / viscosity[:, None])
+
+        low, high = np.zeros_like(middle), middle
+        for _ in range(32):
+            middle = 0.5 * (low + high)
+            fast = rates(middle) @ _WEIGHTS > 2.0 / H
+            low, high = np.where(fast, low, middle), np.where(fast, middle, high)
+        return np.asarray(-2.0 / 3.0 * drop / (rates(middle) @ (_WEIGHTS * _Y)))
+
+
+@lru_cache(maxsize=8)
+def _carreau_curve(exponent: float, plateau: float) -> tuple[Array, Array]:
+    """Logarithms of shear rates and of their stresses, in units of the critical ones."""
+    rates = np.linspace(log(1e-4), log(1e12), 6001)
+    square = np.exp(2.0 * rates)
+    thinner = plateau + (1.0 - plateau) * (1.0 + square) ** (0.5 * (exponent - 1.0))
+    return rates, rates + np.log(thinner)
+
+
+@lru_cache(maxsize=256)
+def thinned(oil: ThinningOil) -> float:
+    """h* of an oil that thins, over that of a Newtonian one of its viscosity at rest."""
+    return local_inlet(oil=oil).H_star / local_inlet().H_star
+
+
 # --- the local problem --------------------------------------------------------------------------
 
 
@@ -118,6 +200,7 @@ def local_inlet(
     inside: float = 300.0,
     outside: float = 100.0,
     spacing: tuple[float, float] = (0.05, 0.06),
+    oil: ThinningOil | None = None,
 ) -> LocalInlet:
     """Solve the local problem by Newton's method; pressures are linear between nodes.
 
@@ -129,6 +212,8 @@ def local_inlet(
         Ends of the mesh, in l; beyond the inner one the pressure is that of the dry contact.
     spacing : (float, float)
         Segment at X = 0, and growth with the distance.
+    oil : ThinningOil, optional
+        Oil that thins under shear; its resistance is that of the last iterate.
 
     Raises
     ------
@@ -144,10 +229,14 @@ def local_inlet(
     k = np.arange(n - 1)
     dry = np.sqrt(np.maximum(-X, 0.0))
     unknowns = np.r_[dry, 4.0 / 3.0 * np.maximum(X, 0.0) ** 1.5 + CONSTANT, CONSTANT]
+    last: Array | None = None
     for _ in range(60):
         P, H, H_star = unknowns[:n], unknowns[n : 2 * n], unknowns[-1]
         H_mid = 0.5 * (H[1:] + H[:-1])
         viscosity = np.exp(A * np.minimum(0.5 * (P[1:] + P[:-1]), far))
+        if oil is not None:  # halfway from that of the last iterate
+            met = oil.resistance(H_mid, np.diff(P) / dX, viscosity)
+            viscosity = last = np.sqrt(met * (met if last is None else last))
         slope = viscosity * (H_mid - H_star) / H_mid**3
         by_H = 0.5 * viscosity * (1.0 / H_mid**3 - 3.0 * (H_mid - H_star) / H_mid**4)
         residual = np.r_[

@@ -107,8 +107,8 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
 
     @property
     def predictable(self) -> bool:
-        """True if the theory of the inlet holds: one round lobe, a closed gap, a Newtonian oil."""
-        return self.round and not (self.opens or self.thins) and self.mesh == "graded"
+        """True if the theory of the inlet holds: one round lobe, a closed gap, a graded mesh."""
+        return self.round and not self.opens and self.mesh == "graded"
 
     @model_validator(mode="after")
     def _nothing_contradicts(self) -> Self:

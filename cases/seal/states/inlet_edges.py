@@ -7,7 +7,7 @@ from math import exp
 
 import numpy as np
 
-from softehl.cases.seal.equations.inlet_theory import Edge, incremental_modulus
+from softehl.cases.seal.equations.inlet_theory import Edge, ThinningOil, incremental_modulus
 from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.gland.parameters import Seal
@@ -74,7 +74,8 @@ def predicted(
     Returns
     -------
     Prediction or None
-        None if the section has several contacts, or one of too few nodes.
+        None if the section has several contacts, or one of too few nodes, or if the oil thins more
+        than the theory can be solved for.
     """
     p = system.parameters
     touching = contacts(system, x) if p.predictable else []
@@ -93,7 +94,23 @@ def predicted(
             return None
         length = edge.length(flow)
     assert edge is not None
-    return Prediction(edge.h_star(flow, p.pressure_viscosity), length / edge.pocket, edge)
+    try:
+        h_star = edge.h_star(flow, p.pressure_viscosity, _thinning_oil(p))
+    except ArithmeticError:
+        return None
+    return Prediction(h_star, length / edge.pocket, edge)
+
+
+def _thinning_oil(p: Seal) -> ThinningOil | None:
+    """The oil of a case if it thins under shear."""
+    values = p.thinning_values(p.viscosity)
+    if not values:
+        return None
+    if p.thins == "eyring":
+        return ThinningOil(values["critical_stress"])
+    return ThinningOil(
+        values["critical_stress"], values["thinning_exponent"], values["thinning_plateau"]
+    )
 
 
 @dataclass(frozen=True)
