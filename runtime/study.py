@@ -893,7 +893,7 @@ class Study:
             until=until,
             start=start,
             detect=detect,
-            most=most,
+            max_points=most,
             options=SolverOptions.merged(
                 options, newton=newton, linear=linear, write=write, progress=progress
             ),
@@ -1158,7 +1158,7 @@ class Study:
             by=by,
             bounds=bounds,
             sigma=sigma,
-            most=most,
+            max_evaluations=most,
             method=method,
             integrator=integrator,
             arguments=path,

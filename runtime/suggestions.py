@@ -14,12 +14,12 @@ _FEW = 2
 """Names that a hint has at most."""
 
 
-def did_you_mean(given: object, known: Iterable[str]) -> str:
+def did_you_mean(text: object, allowed: Iterable[str]) -> str:
     """A hint at the name that was probably meant, at several that are as likely, or nothing.
 
     Capitals do not count. A word that is like no name may be one of the words of a few names.
     """
-    word, names = str(given).lower(), list(known)
+    word, names = str(text).lower(), list(allowed)
     close = difflib.get_close_matches(word, [name.lower() for name in names], n=2)
     likeness = [difflib.SequenceMatcher(None, name, word).ratio() for name in close]
     likely = [n for n, r in zip(close, likeness, strict=True) if r > likeness[0] - _AS_GOOD]
@@ -33,9 +33,9 @@ def join_names(names: Iterable[str]) -> str:
     return ", ".join(names) or "none"
 
 
-def short_list(known: Iterable[str], max_names: int = 5) -> str:
+def short_list(allowed: Iterable[str], max_names: int = 5) -> str:
     """The first of many names and how many there are."""
-    names = list(known)
+    names = list(allowed)
     return (
         join_names(names)
         if len(names) <= max_names + 1

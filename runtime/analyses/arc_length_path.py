@@ -92,7 +92,7 @@ def follow(
     until: Callable[[Result], bool],
     start: Result | Bifurcation | None = None,
     detect: Literal["bifurcation"] | None = None,
-    most: int = 1000,
+    max_points: int = 1000,
     options: SolverOptions,
 ) -> LoadPath:
     """Return the path from load factor 0, or from `start`, by arc length; see `Study.follow`."""
@@ -114,7 +114,7 @@ def follow(
     with prepared.callbacks(LOAD_FACTOR, initial.t, None) as callbacks:
         history = LoadHistory.begin(system, initial, callbacks, keep_all=True)
         rule = StepRule(1e-2 * step, 1e-6 * step, step)
-        arclength = Arclength(newton, rule, max_points=most, name=LOAD_FACTOR)
+        arclength = Arclength(newton, rule, max_points=max_points, name=LOAD_FACTOR)
         if other_branch is None:
             arclength, x = _scaled_by_response(arclength, history, initial, newton)
             leave = None

@@ -135,5 +135,5 @@ def _left_over(
     except StudyError:
         return np.inf
     stiffness = np.array([mode @ (K @ mode), mode @ (initial.K @ mode)])
-    there, here = system.comm.sum(stiffness)
-    return float(abs(there / here)) if here else np.inf
+    total, local_norm = system.comm.sum(stiffness)
+    return float(abs(total / local_norm)) if local_norm else np.inf

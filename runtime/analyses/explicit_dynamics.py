@@ -112,8 +112,8 @@ class ExplicitMarch:
             end, x, forces = self.contact.at_end(end, x)
         if self.body.comm.max(float(not np.isfinite(forces.total + forces.contact).all())):
             where = body.comm.distribute(end).where_not_finite(x)
-            place = where and f": {where}"
-            message = f"t = {t:.6g}: the forces are not finite{place}"
+            suffix = where and f": {where}"
+            message = f"t = {t:.6g}: the forces are not finite{suffix}"
             state = Solution(initial.x, Status.NOT_FINITE, message, (), 0, 0)
             raise NotConverged(Branch((Point(initial.t, state),), Status.NOT_FINITE, message))
         a = self._accelerations(forces.total + forces.contact)
@@ -245,7 +245,7 @@ def _rubs(body: EquationsOfMotion) -> bool:
 class _ContactUnknowns:
     """Pressures and shear stresses at the nodes of contacts, which follow from the displacements.
 
-    pressures, all: their numbers. areas: (n,) of the nodes with them, over the penalty. places:
+    pressures, all: their numbers. areas: (n,) of the nodes with them, over the penalty. reference:
     (n,) coordinates at rest of the unknowns that move the nodes.
     """
 
@@ -253,7 +253,7 @@ class _ContactUnknowns:
     pressures: Integers
     all: Integers
     areas: Array
-    places: Array
+    reference: Array
 
     @classmethod
     def of(cls, body: EquationsOfMotion) -> _ContactUnknowns:
@@ -265,11 +265,11 @@ class _ContactUnknowns:
         numbers = [c.multipliers[c.multipliers[:, 0] >= 0] for c in system.contacts]
         pressures = np.concatenate([n[:, 0] for n in numbers])
         all_of = np.concatenate([n.ravel() for n in numbers])
-        places = np.zeros(system.size)
+        reference = np.zeros(system.size)
         for contact in system.contacts:
             moves = contact.displacements >= 0
-            places[contact.displacements[moves]] = system.mesh.points[moves]
-        return cls(body, pressures, all_of, lumped_areas(blocks, system.size), places)
+            reference[contact.displacements[moves]] = system.mesh.points[moves]
+        return cls(body, pressures, all_of, lumped_areas(blocks, system.size), reference)
 
     def at_end(self, problem: Problem, x: Array) -> tuple[Problem, Array, Forces]:
         """Equations at the end x of a step, x with the means there, and the forces.
@@ -287,11 +287,11 @@ class _ContactUnknowns:
 
     def require_own_pressures(self, problem: Problem, x: Array) -> None:
         """Raise StudyError where pressures of the start are not those of its penetrations."""
-        given, own = x[self.pressures], self._with_means(problem, x)[0][self.pressures]
-        size = float(np.abs([*own, *given]).max(initial=0.0))
-        if given.any() and float(np.abs(given - own).max()) > _SAME * size:
+        prescribed, computed = x[self.pressures], self._with_means(problem, x)[0][self.pressures]
+        size = float(np.abs([*computed, *prescribed]).max(initial=0.0))
+        if prescribed.any() and float(np.abs(prescribed - computed).max()) > _SAME * size:
             raise StudyError(
-                f"explicit: the start has contact pressures up to {given.max():.3g} "
+                f"explicit: the start has contact pressures up to {prescribed.max():.3g} "
                 "MPa without penetration, which a penalty needs: start without contact, from a "
                 'motion by "explicit", or march by "generalised-alpha"'
             )
@@ -307,7 +307,7 @@ class _ContactUnknowns:
             if isinstance(contact, RigidContact):
                 own_forces, own_energy = contact.penalty_forces(x)
                 forces_of_pairs, energy = forces_of_pairs - own_forces, energy + own_energy
-        return energy + 0.5 * float(forces_of_pairs @ (self.places + x))
+        return energy + 0.5 * float(forces_of_pairs @ (self.reference + x))
 
     def frequency_squared(self, problem: Problem) -> float:
         """Bound of that of the penalties."""

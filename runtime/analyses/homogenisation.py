@@ -369,11 +369,11 @@ class Basis:
 class _ReducedPattern:
     """Pattern of B' K B for B of zeros and ones, and the positions of the entries of K in it.
 
-    full: indptr and indices of K. kept: entries of K that are in it. positions: of these.
+    full: indptr and indices of K. mask: entries of K that are in it. positions: of these.
     """
 
     full: tuple[Small, Small]
-    kept: Flags
+    mask: Flags
     positions: Integers
     indptr: Small
     indices: Small
@@ -385,11 +385,11 @@ class _ReducedPattern:
             column[K.indices],
             column[np.repeat(np.arange(K.shape[1]), np.diff(K.indptr))],
         )
-        kept = (rows >= 0) & (columns >= 0)
-        keys, positions = np.unique(columns[kept] * size + rows[kept], return_inverse=True)
+        mask = (rows >= 0) & (columns >= 0)
+        keys, positions = np.unique(columns[mask] * size + rows[mask], return_inverse=True)
         indptr = np.searchsorted(keys, size * np.arange(size + 1)).astype(np.int32)
         indices = (keys % max(size, 1)).astype(np.int32)
-        return cls((K.indptr, K.indices), kept, positions, indptr, indices)
+        return cls((K.indptr, K.indices), mask, positions, indptr, indices)
 
     def fits(self, K: csc_array[np.float64]) -> bool:
         """True if K has this pattern."""
@@ -398,7 +398,7 @@ class _ReducedPattern:
 
     def matrix(self, K: csc_array[np.float64]) -> csc_array[np.float64]:
         """B' K B."""
-        entries: Any = np.bincount(self.positions, K.data[self.kept], len(self.indices))
+        entries: Any = np.bincount(self.positions, K.data[self.mask], len(self.indices))
         data: Array = entries.astype(np.float64, copy=False)  # integers where there are none
         size = len(self.indptr) - 1
         return csc_array((data, self.indices, self.indptr), shape=(size, size))

@@ -73,7 +73,7 @@ class SolverOptions:
         engine = engine_of(self.engine, self.linear, self.device)
         if not isinstance(engine, Serial):
             _require_no_unit_cells(definition, engine)
-        system = engine.spread(build_system(definition))
+        system = engine.distribute(build_system(definition))
         return PreparedSystem(system, engine.newton(system, self.newton), note_of(engine), self)
 
 

@@ -137,15 +137,15 @@ class CellGroup:
             tolerance=_TOLERANCE, linear=FactorisationCache(direct_solver("auto"))
         )
     )
-    _begun: Any = None
+    _pending: Any = None
 
     def begin(self, task: str, *arguments: Any) -> None:
         """See `CellShare`."""
-        self._begun = task, arguments
+        self._pending = task, arguments
 
     def receive(self) -> Any:
         """See `CellShare`."""
-        task, arguments = self._begun
+        task, arguments = self._pending
         return getattr(self, task)(*arguments)
 
     @cached_property
@@ -214,10 +214,10 @@ class CellGroup:
         last = self.trials[k]
         if last is not None and np.array_equal(last.F, F):
             return last
-        before = CellState(*self.layout.state(self.rows[k])[:2])
-        starts = [before]
-        if last is not None and not last.fault and _distance(last, F) < _distance(before, F):
-            starts = [last, before]
+        at_start = CellState(*self.layout.state(self.rows[k])[:2])
+        starts = [at_start]
+        if last is not None and not last.fault and _distance(last, F) < _distance(at_start, F):
+            starts = [last, at_start]
         for start in starts:
             state = self._reached(k, start, F)
             if not state.fault:
@@ -391,7 +391,7 @@ class UnitCells:
     processes: int = 1
     _states: Array | None = field(default=None, init=False, repr=False)
     _time: tuple[float, float] | None = field(default=None, init=False, repr=False)
-    _shares: list[CellShare] = field(default_factory=list, init=False, repr=False)
+    _groups: list[CellShare] = field(default_factory=list, init=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """For `copy` and `pickle`: without what only saves time."""
@@ -473,9 +473,9 @@ class UnitCells:
         time, same = _time_of(parameters), self._states is states
         if same and self._time == time:
             return
-        if not self._shares:
+        if not self._groups:
             others = [RemoteGroup(self.cell) for _ in range(self.processes - 1)]
-            self._shares = [CellGroup(self.cell), *others]
+            self._groups = [CellGroup(self.cell), *others]
         self._shared("start", None if same else states.reshape(-1, states.shape[2]), time)
         self._states, self._time = states, time
 
@@ -486,16 +486,16 @@ class UnitCells:
         """
         parts = [slice(k, None, self.processes) for k in range(self.processes)]
         try:
-            for part, share in zip(parts, self._shares, strict=True):
+            for part, share in zip(parts, self._groups, strict=True):
                 share.begin(task, None if values is None else values[part], *more)
-            return [(p, s.receive()) for p, s in zip(parts, self._shares, strict=True)]
+            return [(p, s.receive()) for p, s in zip(parts, self._groups, strict=True)]
         except BaseException:  # replies that are not received would be those of the next task
-            self._shares, self._states = [], None
+            self._groups, self._states = [], None
             raise
 
     def _one(self, number: int, task: str, F: Array) -> Any:
         """Result of a task of one cell."""
-        share = self._shares[number % self.processes]
+        share = self._groups[number % self.processes]
         share.begin(task, number // self.processes, F)
         return share.receive()
 

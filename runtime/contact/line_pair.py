@@ -99,18 +99,18 @@ class LineGeometry:
         t = slope[0] / length, slope[1] / length
         eta = _partner(self.other, other, at, t)
         M = _shape(self.other, eta)
-        there = _sum(M, other)
-        rest, before = self._duals(self.X), self._duals(self.previous)
-        was, were = _sum(N, before[:k]), _sum(M, before[k:])
-        along = _sum(_slope(self.one, xi), rest[:k])
+        partner = _sum(M, other)
+        reference, previous = self._duals(self.X), self._duals(self.previous)
+        was, were = _sum(N, previous[:k]), _sum(M, previous[k:])
+        along = _sum(_slope(self.one, xi), reference[:k])
         area, deformed = (along[0] * along[0] + along[1] * along[1]).root(), length
         if self.ring:
-            area = area * _sum(N, rest[:k])[1] * (2.0 * np.pi)
+            area = area * _sum(N, reference[:k])[1] * (2.0 * np.pi)
             deformed = deformed * at[1] * (2.0 * np.pi)
         return PairPoint(
             weight=_varied(share * area),
             vectors={
-                "apart": _vector(there, at),
+                "apart": _vector(partner, at),
                 "slope_a": _stacked(slope),
                 "came": _vector(were, was),
             },
@@ -118,7 +118,7 @@ class LineGeometry:
             first=_stacked(N),
             second=_stacked(M),
             corners=_stacked(_shape(CELLS["line2"], xi)),
-            place=np.stack([at[0].value, at[1].value], axis=1),
+            position=np.stack([at[0].value, at[1].value], axis=1),
         )
 
     def _duals(self, x: Array, *, varied: bool = False) -> _Nodes:
@@ -161,8 +161,8 @@ def _inside(xi: _Dual) -> _Dual:
 
 def _shape(cell: Cell, xi: _Dual) -> list[_Dual]:
     """Shape functions of a line with its ends first."""
-    values, slopes = cell.shape(xi.value[:, None]), cell.gradient(xi.value[:, None])[:, :, 0]
-    return [_Dual(v, d[:, None] * xi.slope) for v, d in zip(values.T, slopes.T, strict=True)]
+    values, derivatives = cell.shape(xi.value[:, None]), cell.gradient(xi.value[:, None])[:, :, 0]
+    return [_Dual(v, d[:, None] * xi.slope) for v, d in zip(values.T, derivatives.T, strict=True)]
 
 
 def _slope(cell: Cell, xi: _Dual) -> list[_Dual]:

@@ -97,14 +97,14 @@ class MortarPairKernel:
         z, dz = (np.concatenate([p[i] for p in parts], axis=1) for i in (0, 1))
         limits = data[:, width : width + 4]
         arrays = np.empty((n, 0)), np.ascontiguousarray(z)
-        given = {"data": np.ascontiguousarray(limits), "parameters": np.empty(0)}
+        arguments = {"data": np.ascontiguousarray(limits), "parameters": np.empty(0)}
         node_weights = _opposite(point.first, point.second)
         W, dW = point.weight
         rows = [0, 1, 2, 12, 13, 14, 15]
         if K is None:
-            f = W[:, None] * self.law.residual(*arrays, **given)[:, rows]
+            f = W[:, None] * self.law.residual(*arrays, **arguments)[:, rows]
         else:
-            values, derivatives = self.law.tangent(*arrays, **given)
+            values, derivatives = self.law.tangent(*arrays, **arguments)
             df = W[:, None, None] * np.einsum("nij,njm->nim", derivatives[:, rows], dz)
             df += values[:, rows, None] * dW[:, None]
             f = W[:, None] * values[:, rows]
@@ -133,7 +133,7 @@ class PairPoint:
     weight: (n,) by the undeformed area. vectors: (n, dim) "apart", from the point to the partner,
     "slope_a", "slope_b", along the side, and "came", which "apart" was before the step. area_ratio:
     (n,) deformed over undeformed area. first, second, corners: shape functions (n, k) of the nodes
-    of both sides, and of the corners of the first one. place: (n, dim) of the point.
+    of both sides, and of the corners of the first one. position: (n, dim) of the point.
     """
 
     weight: Varied
@@ -142,7 +142,7 @@ class PairPoint:
     first: Varied
     second: Varied
     corners: Varied
-    place: Array
+    position: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +201,7 @@ class FaceGeometry:
                 first=_shapes(self.one, xi),
                 second=_shapes(self.other, eta),
                 corners=_shapes(self.one.linear, xi),
-                place=z[0],
+                position=z[0],
             )
 
     def _vectors(self, xi: Varied, eta: Varied) -> dict[str, Varied]:

@@ -81,25 +81,25 @@ class PairLawKernel:
         """Names of the history of the law."""
         return tuple(u[: -len(BEFORE)] for u in self.law.unknowns if u.endswith(BEFORE))
 
-    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def residual(self, coordinates: Array, dofs: Array, **arguments: Any) -> Array:
         """Element residuals (n, ndof)."""
         R = np.zeros(dofs.shape)
-        for point in self._points(coordinates, dofs, given["data"], columns=0):
-            rows, z, _ = self._inputs(point, dofs, given["data"])
-            f = self.law.residual(np.empty((len(rows), 0)), z, parameters=given["parameters"])
+        for point in self._points(coordinates, dofs, arguments["data"], columns=0):
+            rows, z, _ = self._inputs(point, dofs, arguments["data"])
+            f = self.law.residual(np.empty((len(rows), 0)), z, parameters=arguments["parameters"])
             for row, sign, columns, (S, _) in self._tests(point):
                 R[np.ix_(rows, columns)] += (
                     sign * (point.weight[0][rows] * f[:, row])[:, None] * S[rows]
                 )
         return R
 
-    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+    def tangent(self, coordinates: Array, dofs: Array, **arguments: Any) -> tuple[Array, Array]:
         """Element residuals (n, ndof) and tangents (n, ndof, ndof)."""
         n, ndof = dofs.shape
         R, K = np.zeros((n, ndof)), np.zeros((n, ndof, ndof))
-        for point in self._points(coordinates, dofs, given["data"], columns=ndof):
-            rows, z, dz = self._inputs(point, dofs, given["data"])
-            f, D = self.law.tangent(np.empty((len(rows), 0)), z, parameters=given["parameters"])
+        for point in self._points(coordinates, dofs, arguments["data"], columns=ndof):
+            rows, z, dz = self._inputs(point, dofs, arguments["data"])
+            f, D = self.law.tangent(np.empty((len(rows), 0)), z, parameters=arguments["parameters"])
             W, dW = (v[rows] for v in point.weight)
             df = np.einsum("nij,njm->nim", D, dz)
             for row, sign, columns, (S, dS) in self._tests(point):
@@ -112,7 +112,7 @@ class PairLawKernel:
                 K[np.ix_(rows, columns)] += change
         return R, K
 
-    def rate(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+    def rate(self, coordinates: Array, dofs: Array, direction: Array, **arguments: Any) -> Array:
         """Rate of the residuals (n, ndof) as the parameters move by direction, (n, k).
 
         Raises KernelError where the law has no derivatives.
@@ -122,39 +122,39 @@ class PairLawKernel:
                 f"{self.law.name} comes as C without derivatives: give its page instead"
             )
         R, law = np.zeros(dofs.shape), self.differentiated()
-        for point in self._points(coordinates, dofs, given["data"], columns=0):
-            rows, z, _ = self._inputs(point, dofs, given["data"])
+        for point in self._points(coordinates, dofs, arguments["data"], columns=0):
+            rows, z, _ = self._inputs(point, dofs, arguments["data"])
             arrays = np.empty((len(rows), 0)), z, np.ascontiguousarray(direction[rows])
-            f = law.pseudo_load(*arrays, parameters=given["parameters"])
+            f = law.pseudo_load(*arrays, parameters=arguments["parameters"])
             for row, sign, columns, (S, _) in self._tests(point):
                 share = sign * point.weight[0][rows] * f[:, row]
                 R[np.ix_(rows, columns)] += share[:, None] * S[rows]
         return R
 
-    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+    def fields_at(self, coordinates: Array, dofs: Array, **arguments: Any) -> Array:
         """None, (n, 0, 0): see `evaluated`."""
         return np.empty((len(dofs), 0, 0))
 
     def evaluated(
-        self, coordinates: Array, dofs: Array, **given: Any
+        self, coordinates: Array, dofs: Array, **arguments: Any
     ) -> Iterator[tuple[Integers, PairPoint, dict[str, Array]]]:
         """Yield for each integration point the elements (m,) where the law acts, and values there.
 
         They are the fields of the page, the place, the undeformed area, and new history.
         """
-        for point in self._points(coordinates, dofs, given["data"], columns=0):
-            rows, z, _ = self._inputs(point, dofs, given["data"])
+        for point in self._points(coordinates, dofs, arguments["data"], columns=0):
+            rows, z, _ = self._inputs(point, dofs, arguments["data"])
             values: dict[str, Array] = {}
             if self.law.fields:
-                found = self.law.fields_at(
-                    np.empty((len(rows), 0)), z, parameters=given["parameters"]
+                fields = self.law.fields_at(
+                    np.empty((len(rows), 0)), z, parameters=arguments["parameters"]
                 )
-                values = {name: found[:, 0, k] for k, name in enumerate(self.law.fields)}
+                values = {name: fields[:, 0, k] for k, name in enumerate(self.law.fields)}
             for k, u in enumerate(self.law.unknowns):
                 if u.endswith(BEFORE):
                     values[u] = z[:, k]
-            places = point.place[rows].T
-            values |= dict(zip(AXES, places, strict=False))
+            positions = point.position[rows].T
+            values |= dict(zip(AXES, positions, strict=False))
             yield rows, point, values | {"area": point.weight[0][rows]}
 
     def _points(
@@ -189,15 +189,15 @@ class PairLawKernel:
         corners = self.one.corners
         history = data[rows, first + 2 : first + 2 + corners * len(self.history)]
         history = history.reshape(len(rows), corners, len(self.history))
-        places, parts = self._columns, []
+        positions, parts = self._columns, []
         for name in self.law.unknowns:
             if name.endswith(BEFORE):
                 k = self.history.index(name[: -len(BEFORE)])
                 L, dL = point.corners
                 value = np.einsum("nk,nk->n", L[rows], history[:, :, k])
                 parts.append((value, np.einsum("nkm,nk->nm", dL[rows], history[:, :, k])))
-            elif name in places:
-                columns = places[name]
+            elif name in positions:
+                columns = positions[name]
                 N, dN = self._shape(point, name)
                 u, slope = dofs[rows][:, columns], np.zeros((len(rows), dN.shape[2]))
                 if dN.shape[2]:
@@ -219,19 +219,19 @@ class PairLawKernel:
         across = np.stack([a[:, 1], -a[:, 0]], axis=1) if self.dimension == 2 else None
         if across is None:
             across = np.cross(a, point.vectors["slope_b"][0])
-        apart = point.vectors["apart"][0]
-        return np.asarray((apart * across).sum(axis=1) / np.linalg.norm(across, axis=1))
+        distance = point.vectors["apart"][0]
+        return np.asarray((distance * across).sum(axis=1) / np.linalg.norm(across, axis=1))
 
     def _tests(self, point: PairPoint) -> Iterator[_Test]:
         """Variations that the rows of the law belong to.
 
         That of a gap or slip is one of the places at rest on their sides.
         """
-        places, d = self._columns, self.dimension
+        positions, d = self._columns, self.dimension
         count = len(self.one.nodes), len(self.other.nodes)
         for row, name in enumerate(self.law.unknowns):
-            if name in places:
-                yield row, 1.0, places[name], self._shape(point, name)
+            if name in positions:
+                yield row, 1.0, positions[name], self._shape(point, name)
                 continue
             vector, _, axis = name.rpartition("_")
             if self.moves and vector in ("apart", "came"):
@@ -390,13 +390,13 @@ def fields_of_law(
     blocks: Iterable[ElementBlock], x: Array, parameters: Mapping[str, Array]
 ) -> dict[str, Array]:
     """Fields (m,) at the points of some blocks where the law acts, and their place and area."""
-    found: dict[str, list[Array]] = {}
+    fields: dict[str, list[Array]] = {}
     for block in blocks:
         for _, _, values in _evaluated(block, x, parameters[block.name]):
             for name, value in values.items():
                 if not (name.startswith(NEW) or name.endswith(BEFORE)):
-                    found.setdefault(name, []).append(value)
-    return {name: np.concatenate(parts) for name, parts in found.items()}
+                    fields.setdefault(name, []).append(value)
+    return {name: np.concatenate(parts) for name, parts in fields.items()}
 
 
 def _evaluated(
@@ -404,8 +404,8 @@ def _evaluated(
 ) -> Iterator[tuple[Integers, PairPoint, dict[str, Array]]]:
     """See `PairLawKernel.evaluated`."""
     assert isinstance(block.kernel, PairLawKernel)
-    given = {"data": block.data, "parameters": parameters}
-    return block.kernel.evaluated(block.coordinates, x[block.dofs], **given)
+    arguments = {"data": block.data, "parameters": parameters}
+    return block.kernel.evaluated(block.coordinates, x[block.dofs], **arguments)
 
 
 def corner_areas(search: Contact | FaceContact) -> Array:

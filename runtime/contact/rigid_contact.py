@@ -189,11 +189,11 @@ class RigidContact:
         cell, rule = kernel.cell, kernel.rule
         X, N, area = self.points[faces], cell.shape(rule.points), self._areas(side)
         q = area.shape[1]
-        here, there = (self._seen(faces, N, v).reshape(n * q, dim) for v in (x, old))
+        current, previous = (self._seen(faces, N, v).reshape(n * q, dim) for v in (x, old))
         constants = [np.full(n * q, v) for v in (self.friction, self.depth)]
         reference = np.broadcast_to(self.reference, (n * q, dim))
-        columns = [np.repeat(side.rho, q), *constants, reference, there, area.ravel()]
-        data = np.column_stack([*columns, self.surface.nearest(here).columns])
+        columns = [np.repeat(side.rho, q), *constants, reference, previous, area.ravel()]
+        data = np.column_stack([*columns, self.surface.nearest(current).columns])
         moved = self.displacements[faces].reshape(n, -1)
         multipliers = self.multipliers[faces[:, : cell.corners]].reshape(n, -1)
         motion = np.broadcast_to(self.motion, (n, len(self.motion)))

@@ -45,9 +45,9 @@ class Nearest:
     @property
     def gap(self) -> Array:
         """Distances (n,) of the points, negative inside of the rigid body."""
-        apart = self.points - self.centre
-        along = np.einsum("nc,nc->n", apart, self.axis)
-        length = np.linalg.norm(apart - along[:, None] * self.axis, axis=1)
+        offsets = self.points - self.centre
+        along = np.einsum("nc,nc->n", offsets, self.axis)
+        length = np.linalg.norm(offsets - along[:, None] * self.axis, axis=1)
         return np.asarray(np.where(self.flat > 0.0, along, self.side * (length - self.radius)))
 
     @property
@@ -213,11 +213,11 @@ class Polyline:
             corners = np.array(points, dtype=np.float64)
         except (TypeError, ValueError):
             corners = np.empty(0)
-        least = 3 if closed else 2
-        if corners.ndim != 2 or len(corners) < least or corners.shape[1] not in (2, 3):
+        minimum = 3 if closed else 2
+        if corners.ndim != 2 or len(corners) < minimum or corners.shape[1] not in (2, 3):
             raise SurfaceError(
-                f"Polyline: points of shape {np.shape(points)}: at least {least} corners of 2 or 3 "
-                "coordinates are needed"
+                f"Polyline: points of shape {np.shape(points)}: at least {minimum} corners of 2 or "
+                "3 coordinates are needed"
             )
         if not np.isfinite(corners).all():
             raise SurfaceError("Polyline: points must be finite")
@@ -225,9 +225,9 @@ class Polyline:
             raise SurfaceError("Polyline: along=... is the direction of extrusion in 3-D")
         self.points, self.closed = corners, bool(closed)
         self.along = None if along is None else _direction("Polyline", "along", along, 3)
-        ends = np.roll(corners, -1, axis=0) if closed else corners[1:]
+        stops = np.roll(corners, -1, axis=0) if closed else corners[1:]
         self._start = corners if closed else corners[:-1]
-        chord = ends - self._start
+        chord = stops - self._start
         self._length = np.linalg.norm(chord, axis=1)
         self._size = float(np.ptp(corners, axis=0).max())
         if not (self._length > _NEAR * self._size).all():

@@ -101,9 +101,9 @@ def add_contact(
 
     coefficients: friction, stiffness, depth, reach.
     """
-    taken = [*definition.blocks, *(contact.name for contact in definition.contacts)]
-    if name in taken:
-        raise StudyError(f"contact(name={name!r}): the name is taken; blocks: {join_names(taken)}")
+    used = [*definition.blocks, *(contact.name for contact in definition.contacts)]
+    if name in used:
+        raise StudyError(f"contact(name={name!r}): the name is taken; blocks: {join_names(used)}")
     side, other = sides
     surface: Surface | None = None
     meeting: tuple[str | Predicate, str | Predicate | None] = side, None
@@ -111,8 +111,8 @@ def add_contact(
         meeting = side, other
     else:
         surface = other
-    shown = display_name(side) if other is None else f"{display_name(side)}, {_other_name(other)}"
-    context = f"contact({shown})"
+    title = display_name(side) if other is None else f"{display_name(side)}, {_other_name(other)}"
+    context = f"contact({title})"
     if law is None and parameters:
         raise StudyError(
             f"{context}: {join_names(parameters)}: only a law, law=page, has parameters"
@@ -197,9 +197,9 @@ def _contact_and_sides(
 ) -> tuple[ContactRequest, dict[str, Block]]:
     """A contact and the blocks of its sides.  Raises StudyError, MeshError."""
     mesh, axisymmetric = definition.mesh, definition.axisymmetric
-    shown = [display_name(s) for s in sides if s is not None]
-    shown += [] if surface is None else [repr(surface)]
-    context = f"contact({', '.join(shown)})"
+    title = [display_name(s) for s in sides if s is not None]
+    title += [] if surface is None else [repr(surface)]
+    context = f"contact({', '.join(title)})"
     mesh.require_whole(context)
     if mesh.dimension not in KINDS:
         raise StudyError(f"{context}: contact is for meshes in 2-D and 3-D, this one is a line")

@@ -220,10 +220,10 @@ def _arrays(block: str, kernel: Kernel, arguments: Mapping[str, Any]) -> dict[st
     return arrays
 
 
-def _array_data(block: str, array: RunTimeArray, given: object) -> ArrayData:
+def _array_data(block: str, array: RunTimeArray, value: object) -> ArrayData:
     """Points of a curve or weights of a network.  Raises StudyError."""
     try:
-        return data_of(array, given)
+        return data_of(array, value)
     except ArrayDataError as error:
         raise StudyError(f"{block!r}: {array.name}: {error}") from None
 
@@ -302,7 +302,7 @@ def _automatic(
     page_slots: unknowns as the page calls them; study_slots: as the study does.
     """
     pairs = zip(page_slots, study_slots, strict=True)
-    nodal = {f"{s.name}{{}}{s.node + 1}": ours for s, ours in pairs if s.node is not None}
+    nodal = {f"{s.name}{{}}{s.node + 1}": name for s, name in pairs if s.node is not None}
     tables = [
         {label.format(suffix): slot for label, slot in nodal.items()}
         for suffix in ("_old", "_rate", "_acceleration")

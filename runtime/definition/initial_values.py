@@ -111,9 +111,9 @@ def _elements_in(mesh: Mesh, block: Block, name: str, where: Where | None) -> Fl
     if where is None:
         return np.ones(len(block.nodes), dtype=bool)
     if callable(where):
-        chosen = np.zeros(len(mesh.points), dtype=bool)
-        chosen[mesh.nodes(where)] = True
-        return np.asarray(chosen[block.nodes].all(axis=1))
+        selected = np.zeros(len(mesh.points), dtype=bool)
+        selected[mesh.nodes(where)] = True
+        return np.asarray(selected[block.nodes].all(axis=1))
     if not isinstance(where, str) or where not in mesh.groups:
         raise StudyError(
             f"initial({display_name(where)}, {name}=...): {name!r} stands at the points of "

@@ -101,7 +101,7 @@ def _orders(block: str, kernel: Kernel, form: PageOptions) -> dict[str, int]:
     Raises StudyError.
     """
     along = form.along
-    orders = {n: int(given) for n, given in along.items() if isinstance(given, int | np.integer)}
+    orders = {n: int(order) for n, order in along.items() if isinstance(order, int | np.integer)}
     if orders and (len(orders) < len(along) or kernel.nodes < 2):
         raise StudyError(
             f"{block!r}: along = {join_names(along)}: orders for all of them, on lines of 2 nodes "

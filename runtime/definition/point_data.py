@@ -105,8 +105,8 @@ class IntegrationPoints:
         """
         n, q, context = len(self.nodes), self.count, f"{block!r}: {name}"
         if callable(value):
-            places = self.coordinates if self.shape is not None else self.centres[:, None]
-            flat = datum(block, name, value, places.reshape(-1, self.mesh.dimension))
+            points = self.coordinates if self.shape is not None else self.centres[:, None]
+            flat = datum(block, name, value, points.reshape(-1, self.mesh.dimension))
             return np.array(np.broadcast_to(flat.reshape(n, -1), (n, q)))
         if isinstance(value, np.ma.MaskedArray):
             raise StudyError(

@@ -146,8 +146,8 @@ def _reference_point(
 def _require_body(context: str, points: Array) -> None:
     """Raise StudyError for nodes that leave a rotation undetermined."""
     dimension, size = points.shape[1], float(np.ptp(points, axis=0).max(initial=0.0))
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    wide = int((spread > _FLAT * max(size, 1e-300)).sum())
+    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    wide = int((extents > _FLAT * max(size, 1e-300)).sum())
     if wide < dimension - 1:
         kind = "at one place" if wide == 0 else "on a line"
         raise StudyError(

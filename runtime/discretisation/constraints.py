@@ -146,7 +146,7 @@ class Constraints:
         moving[self.slaves] = False
         return moving
 
-    def spread(self, x: Array) -> None:
+    def copy_to_slaves(self, x: Array) -> None:
         """T z in place: slaves take the value of their masters."""
         x[self.slaves] = x[self.masters[self.slaves]]
 
@@ -161,7 +161,7 @@ class Constraints:
             x[self.free] = self.exchange.copied(z)
         else:
             x[self.moving] = z
-            self.spread(x)
+            self.copy_to_slaves(x)
         return x
 
     def gather(self, forces: Array) -> Array:

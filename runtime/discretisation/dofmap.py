@@ -230,7 +230,7 @@ class ElementUnknowns:
     along: Mapping[str, Integers] = field(default_factory=lambda: MappingProxyType({}))
 
     @cached_property
-    def own(self) -> dict[str, None]:
+    def shared_names(self) -> dict[str, None]:
         """Names of the unknowns without a node, in their order."""
         return dict.fromkeys(slot.name for slot in self.slots if slot.node is None)
 
@@ -320,7 +320,7 @@ def _present(points: int, blocks: Sequence[ElementUnknowns]) -> dict[str, Flags]
 
 def _others(blocks: Sequence[ElementUnknowns]) -> dict[str, int]:
     """Numbers of the unknowns of elements, and of those along elements, by name."""
-    element_names = dict.fromkeys(name for block in blocks for name in block.own)
+    element_names = dict.fromkeys(name for block in blocks for name in block.shared_names)
     offsets = {name: _first(name, blocks, None) for name in element_names}
     for block in blocks:
         for name, points in block.along.items():
@@ -335,7 +335,7 @@ def _first(name: str, blocks: Sequence[ElementUnknowns], until: ElementUnknowns 
 
     The one that blocks share comes first.
     """
-    users = [block for block in blocks if name in block.own]
+    users = [block for block in blocks if name in block.shared_names]
     count = int(any(name in user.shared for user in users))
     for user in users:
         if user is until:

@@ -207,8 +207,8 @@ class ElementBlock:
             Their positions.
         """
         n = len(self.dofs)
-        whole = isinstance(self.kernel, ModelKernel)  # which knows its states by their array
-        step = n if whole else max(_PIECE // max(self.dofs.shape[1] ** 2, 1), _GROUP)
+        is_model = isinstance(self.kernel, ModelKernel)  # which knows its states by their array
+        step = n if is_model else max(_PIECE // max(self.dofs.shape[1] ** 2, 1), _GROUP)
         if n <= step:
             yield self, scatter
             return

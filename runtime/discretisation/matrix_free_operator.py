@@ -248,8 +248,8 @@ class MatrixFreeOperator:
                 product = backend.product(block, x, parameters, levels)
                 products.append(product)
                 free = ties.constraints.free
-                coarse, own = backend.coarse(block, product, x, levels, free)
-                lower, diagonal = lower + coarse, diagonal + own
+                coarse, coarse_diagonal = backend.coarse(block, product, x, levels, free)
+                lower, diagonal = lower + coarse, diagonal + coarse_diagonal
             else:
                 tangents = block.tangent(x, parameters)[1]
                 loads_matrix = loads_matrix + assembled(block.dofs, tangents, len(x))
@@ -307,7 +307,7 @@ class MatrixFreeOperator:
         x, constraints = source[: len(v)], self.ties.levels[0]
         x[:] = v
         x[self.constrained] = 0.0
-        constraints.spread(x)
+        constraints.copy_to_slaves(x)
         y = self._product(source, target).copy()
         constraints.collect(y)
         y[self.constrained] = v[self.constrained]
@@ -341,7 +341,7 @@ class MatrixFreeOperator:
         constraints.collect(b)
         b[self.constrained] = 0.0
         z = self._iterated(b)
-        constraints.spread(z)
+        constraints.copy_to_slaves(z)
         x[order] += z
         if tied:
             ties.put_forces(x, r - self._untied(x))
@@ -464,9 +464,9 @@ def coarse_matrix(
     return matrix, diagonal
 
 
-def _summed(places: Integers, values: Array, size: int) -> Array:
+def _summed(positions: Integers, values: Array, size: int) -> Array:
     """Sums (size,) of values at places."""
-    sums = np.bincount(places, weights=values.ravel(), minlength=size)
+    sums = np.bincount(positions, weights=values.ravel(), minlength=size)
     return np.asarray(sums, dtype=np.float64)
 
 

@@ -242,10 +242,10 @@ class ElementProduct:
 
     def add(self, x: Array, y: Array) -> None:
         """y += K x for vectors of the whole system."""
-        places, source, target = self.numbering, self.numbering.vector(), self.numbering.vector()
-        source[places.at] = x[places.unknowns]
+        numbering, source, target = self.numbering, self.numbering.vector(), self.numbering.vector()
+        source[numbering.at] = x[numbering.unknowns]
         self(source, target)
-        y[places.unknowns] += target[places.at]
+        y[numbering.unknowns] += target[numbering.at]
 
 
 def _aligned(rows: int, columns: int) -> Array:

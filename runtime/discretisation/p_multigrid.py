@@ -140,8 +140,8 @@ class MultigridLevels:
             first = np.concatenate([d[:, :, 0].ravel() for d in lower_dofs.values()])
             at = np.flatnonzero(np.isin(nodal[0], first))
             level_unknowns = np.stack([numbers[at] for numbers in nodal], axis=1).ravel()
-            places = inverse(level_unknowns, size)
-            dofs.append({n: places[d.reshape(len(d), -1)] for n, d in lower_dofs.items()})
+            lower_numbers = inverse(level_unknowns, size)
+            dofs.append({n: lower_numbers[d.reshape(len(d), -1)] for n, d in lower_dofs.items()})
             pairs = [
                 (
                     dofs[-2][b.name],

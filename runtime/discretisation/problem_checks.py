@@ -168,7 +168,7 @@ def not_finite(block: ElementBlock, results: Sequence[Array]) -> str:
 
 
 def fault_message(
-    block: ElementBlock, x: Array, parameters: Array, row: int, known: dict[str, str]
+    block: ElementBlock, x: Array, parameters: Array, row: int, messages: dict[str, str]
 ) -> str:
     """The operation of a page without a value in an element; empty where it is not known.
 
@@ -178,8 +178,8 @@ def fault_message(
     if isinstance(block.kernel, ModelKernel):
         arguments = block.given(parameters)
         return f": {block.kernel.fault(block.coordinates, x[block.dofs], row, **arguments)}"
-    if block.name in known:
-        return known[block.name]
+    if block.name in messages:
+        return messages[block.name]
     begin = perf_counter()
     try:
         fault = block.explain(x, parameters, row).fault
@@ -187,7 +187,7 @@ def fault_message(
         return ""  # no page, or no SymPy
     message = f": {fault}" if fault else ""
     if perf_counter() - begin > _PATIENCE:
-        known[block.name] = message and f"{message}, at the first of several attempts"
+        messages[block.name] = message and f"{message}, at the first of several attempts"
     return message
 
 
@@ -204,22 +204,22 @@ def table_ends(block: ElementBlock, x: Array, parameters: Array) -> str:
     names = [a.name for a in getattr(kernel, "arrays", ()) if a.kind == "table"]
     if not names:
         return ""
-    before = len(rows_not_finite(block.tangent(x, parameters)))
+    invalid_rows = len(rows_not_finite(block.tangent(x, parameters)))
     continued = parameters.copy()
     arrays = unpacked(continued, len(kernel.parameters), len(kernel.arrays))
-    found = []
+    reasons = []
     for array, values in zip(kernel.arrays, arrays, strict=True):
         if array.kind == "table" and np.isnan(values).any():
             knots, saved = points_of(values), values.copy()
             values[:] = with_ends(values)
             after = len(rows_not_finite(block.tangent(x, continued)))
-            if after < before:
+            if after < invalid_rows:
                 bounds = f"{knots[0]:g} to {knots[-1]:g}"
-                found.append(f"the curve {array.name!r} ends there: its points go from {bounds}")
-                before = after
+                reasons.append(f"the curve {array.name!r} ends there: its points go from {bounds}")
+                invalid_rows = after
             else:
                 values[:] = saved
-    return "".join(f"; {text}" for text in found)
+    return "".join(f"; {text}" for text in reasons)
 
 
 def rows_not_finite(results: Sequence[Array]) -> Integers:

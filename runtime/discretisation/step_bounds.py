@@ -37,16 +37,16 @@ class StaysPositive:
 
 @dataclass(frozen=True, eq=False)
 class ChangesLittle:
-    """Quantities x[dofs] + offsets may change by a `fraction`, or by `least`, at a time."""
+    """Quantities x[dofs] + offsets may change by a `fraction`, or by `minimum`, at a time."""
 
     dofs: Integers
     offsets: Array
     fraction: float
-    least: float
+    minimum: float
 
     def limit(self, x: Array, dx: Array) -> float:
         """See `Guard`."""
-        allowed = np.maximum(self.fraction * np.abs(x[self.dofs] + self.offsets), self.least)
+        allowed = np.maximum(self.fraction * np.abs(x[self.dofs] + self.offsets), self.minimum)
         change = np.abs(dx[self.dofs])
         moving = change > allowed
         return float(np.min(allowed[moving] / change[moving])) if moving.any() else 1.0

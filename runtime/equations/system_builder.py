@@ -185,13 +185,13 @@ def _require_independent_links(
                     f"moves with the rigid body {owner[dof]!r}: prescribe the motion of the body, "
                     f"fix({owner[dof]!r}, ...), and leave the node out here"
                 )
-    held: Flags = owner != ""
+    prescribed: Flags = owner != ""
     for condition in definition.conditions:
         dofs = numbering.nodal[condition.name][condition.nodes]
-        held[dofs[dofs >= 0]] = True
+        prescribed[dofs[dofs >= 0]] = True
     a, b, _ = tie_dofs(assembler).T
     group = tied_groups(a, b, assembler.size)
-    count = np.bincount(group[held], minlength=assembler.size)
+    count = np.bincount(group[prescribed], minlength=assembler.size)
     for dof in np.flatnonzero((count[group] > 1) & (owner != "")):
         raise StudyError(
             f"a tie joins a node of the rigid body {owner[dof]!r} with one that is prescribed or "

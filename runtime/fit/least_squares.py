@@ -151,8 +151,8 @@ def _limits(inputs: Sequence[Input], bounds: Bounds) -> tuple[Array, Array]:
             raise StudyError(f"bounds: no input {key!r}; there are {join_names(map(str, keys))}")
     lower, upper = [], []
     for item in inputs:
-        least, most = bounds.get(item.key, (-np.inf, np.inf))
-        low, high = np.full(len(item.value), least), np.full(len(item.value), most)
+        low_bound, high_bound = bounds.get(item.key, (-np.inf, np.inf))
+        low, high = np.full(len(item.value), low_bound), np.full(len(item.value), high_bound)
         if isinstance(item, PageArray):
             low, high = np.maximum(low, item.bounds[0]), np.minimum(high, item.bounds[1])
         lower.append(low)
@@ -394,7 +394,7 @@ def fit(
     by: By,
     bounds: Bounds | None = None,
     sigma: float | Array | None = None,
-    most: int = 100,
+    max_evaluations: int = 100,
     method: Any = GAUSS_NEWTON,
     integrator: Any = None,
     arguments: Mapping[str, Any],
@@ -415,4 +415,4 @@ def fit(
     data = Measurements.read(measured, times)
     deviations = None if sigma is None else np.broadcast_to(sigma, data.numbers.shape).copy()
     trials = StudyEvaluations.by(definition, by, arguments)
-    return LeastSquares(trials, data, deviations).fit(bounds, most, method)
+    return LeastSquares(trials, data, deviations).fit(bounds, max_evaluations, method)

@@ -84,8 +84,8 @@ def _model_step(g: Array, H: Array, radius: float) -> Array:
     def excess(shift: float) -> float:
         return float(np.linalg.norm(step(shift))) / radius - 1.0
 
-    least = max(0.0, smallest - float(sizes[0]))
-    if excess(least) <= 0.0:
-        return step(least)
-    most = least + float(np.linalg.norm(g)) / radius + abs(float(sizes[0]))
-    return step(brentq(excess, least, most))
+    smallest_shift = max(0.0, smallest - float(sizes[0]))
+    if excess(smallest_shift) <= 0.0:
+        return step(smallest_shift)
+    largest_shift = smallest_shift + float(np.linalg.norm(g)) / radius + abs(float(sizes[0]))
+    return step(brentq(excess, smallest_shift, largest_shift))

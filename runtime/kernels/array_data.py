@@ -18,6 +18,6 @@ KINDS: dict[str, Callable[[RunTimeArray, Any], ArrayData]] = {
 """Maker of the data of an array, by its kind in the manifest. They raise `ArrayDataError`."""
 
 
-def data_of(array: RunTimeArray, given: object) -> ArrayData:
+def data_of(array: RunTimeArray, value: object) -> ArrayData:
     """Data of an array from what a user gave.  Raises `ArrayDataError`."""
-    return KINDS[array.kind](array, given)
+    return KINDS[array.kind](array, value)

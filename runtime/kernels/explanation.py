@@ -61,8 +61,8 @@ class Explanation:
 
 
 def _numbers(values: Array) -> str:
-    shown = "  ".join(f"{v:13.6g}" for v in values[:_SHOWN])
-    return shown + (f"  ... ({len(values)})" if len(values) > _SHOWN else "")
+    text = "  ".join(f"{v:13.6g}" for v in values[:_SHOWN])
+    return text + (f"  ... ({len(values)})" if len(values) > _SHOWN else "")
 
 
 @dataclass(frozen=True, eq=False)

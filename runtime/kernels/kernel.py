@@ -419,8 +419,10 @@ class Kernel(Family):
         if not -n <= element < n:
             raise ArgumentError(f"{self.name}: element = {element}; there are {n} elements")
         one = slice(element % n, element % n + 1)
-        given = {k: v[one] if k in _OF_ELEMENTS else v for k, v in kwargs.items() if v is not None}
-        call = Call(self, task, coordinates[one], dofs[one], CallArguments(**given))
+        arguments = {
+            k: v[one] if k in _OF_ELEMENTS else v for k, v in kwargs.items() if v is not None
+        }
+        call = Call(self, task, coordinates[one], dofs[one], CallArguments(**arguments))
         points, columns = len(call.rule.weights), len(self.data)
         data = call.read[2].ravel()
         at_points, terms = _split_terms(call.kernel, data[columns:].reshape(points, -1))
@@ -445,8 +447,8 @@ def _split_terms(kernel: Family, rows: Array) -> tuple[Array, tuple[tuple[Array,
     of = {a.name: n for a, n in zip(kernel.arrays, kernel.lengths, strict=True)}
     counts = [of[array] for _, array in kernel.term_history]
     first = rows.shape[1] - sum(counts)
-    ends = np.cumsum([first, *counts])
-    pairs = list(pairwise(ends))
+    offsets = np.cumsum([first, *counts])
+    pairs = list(pairwise(offsets))
     return rows[:, :first], tuple(tuple(row[a:b] for a, b in pairs) for row in rows)
 
 

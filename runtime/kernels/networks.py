@@ -54,7 +54,7 @@ class NetworkShape:
         return out
 
     @property
-    def least(self) -> Array:
+    def lower_bounds(self) -> Array:
         """Smallest allowed numbers, flat."""
         rows = []
         for number, shapes in enumerate(self.shapes):
@@ -84,8 +84,8 @@ class Weights:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Zero for weights that must not be negative."""
-        least = self.shape.least
-        return least, np.full(len(least), np.inf)
+        lower_bounds = self.shape.lower_bounds
+        return lower_bounds, np.full(len(lower_bounds), np.inf)
 
     def slope(self) -> None:
         """The unit matrix."""
@@ -130,8 +130,8 @@ def initial_weights(
     """
     shape = NetworkShape(inputs, tuple(layers), convex, monotone)
     rng, out = np.random.default_rng(seed), Layers()
-    least = shape.split(shape.least)
-    for shapes, bounds in zip(shape.shapes, least, strict=True):
+    lower_bounds = shape.split(shape.lower_bounds)
+    for shapes, bounds in zip(shape.shapes, lower_bounds, strict=True):
         parts = []
         for size, low in zip(shapes, bounds, strict=True):
             if len(size) == 1:
@@ -177,25 +177,25 @@ def network_layers(
     """
     shape = NetworkShape(inputs, tuple(layers), convex)
     flat = np.asarray(flat, dtype=np.float64)
-    if flat.shape != shape.least.shape:
-        raise ArrayDataError(f"{flat.shape} weights; this network has {shape.least.shape}")
+    if flat.shape != shape.lower_bounds.shape:
+        raise ArrayDataError(f"{flat.shape} weights; this network has {shape.lower_bounds.shape}")
     return shape.split(flat)
 
 
-def weights_of(array: RunTimeArray, given: Any) -> Weights:
+def weights_of(array: RunTimeArray, value: Any) -> Weights:
     """Weights of what a user gave.  Raises `ArrayDataError`."""
     options = array.options
     shape = NetworkShape(
         options["inputs"], tuple(options["layers"]), options["convex"], options["monotone"]
     )
-    layers = given.layers if isinstance(given, Weights) else _layers(shape, given)
+    layers = value.layers if isinstance(value, Weights) else _layers(shape, value)
     weights = Weights(shape, layers)
-    flat, least = weights.values, shape.least
+    flat, lower_bounds = weights.values, shape.lower_bounds
     if not np.isfinite(flat).all():
         raise ArrayDataError("the weights are not finite")
-    if (flat < least).any():
+    if (flat < lower_bounds).any():
         raise ArrayDataError(
-            f"there is the weight {flat[flat < least].min():.3g}: those of hidden values "
+            f"there is the weight {flat[flat < lower_bounds].min():.3g}: those of hidden values "
             "of a convex network, and all of a monotone one, must not be negative"
         )
     return weights
@@ -211,8 +211,10 @@ def _layers(shape: NetworkShape, weights: Any) -> Layers:
         f"shapes {'; '.join(expected)}"
     )
     if isinstance(weights, np.ndarray) and weights.ndim == 1:
-        if weights.shape != shape.least.shape:
-            raise ArrayDataError(f"{message}; given {weights.shape}, or {shape.least.shape} in one")
+        if weights.shape != shape.lower_bounds.shape:
+            raise ArrayDataError(
+                f"{message}; given {weights.shape}, or {shape.lower_bounds.shape} in one"
+            )
         return shape.split(weights.astype(np.float64))
     if not isinstance(weights, (list, tuple)):
         raise ArrayDataError(f"{message}; given {type(weights).__name__}")

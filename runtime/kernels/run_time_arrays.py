@@ -64,8 +64,8 @@ def require_equal_lengths(groups: Sequence[Sequence[str]], arrays: Mapping[str, 
     for group in groups:
         lengths = {name: len(arrays[name].numbers) for name in group}
         if len(set(lengths.values())) > 1:
-            told = ", ".join(f"{name} has {count}" for name, count in lengths.items())
-            raise ArrayDataError(f"{told} terms: arrays of one sum have equal lengths")
+            text = ", ".join(f"{name} has {count}" for name, count in lengths.items())
+            raise ArrayDataError(f"{text} terms: arrays of one sum have equal lengths")
 
 
 def packed(
@@ -96,5 +96,5 @@ def is_packed(parameters: Array, count: int, arrays: int) -> bool:
     if parameters.ndim != 1 or len(parameters) < head:
         return False
     entries = parameters[count:head].reshape(-1, ENTRIES)
-    ends = [int(at + length * (2 if rate else 1)) for at, length, rate in entries]
-    return max(ends, default=head) == len(parameters)
+    stops = [int(at + length * (2 if rate else 1)) for at, length, rate in entries]
+    return max(stops, default=head) == len(parameters)

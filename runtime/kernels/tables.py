@@ -286,12 +286,12 @@ def with_ends(numbers: Array) -> Array:
     return changed
 
 
-def table_of(array: RunTimeArray, given: Any) -> Table:
+def table_of(array: RunTimeArray, value: Any) -> Table:
     """A curve of what a user gave.  Raises `ArrayDataError`."""
-    if isinstance(given, Table):
-        curve = given
-    elif isinstance(given, (tuple, list)) and len(given) == 2:
-        curve = Table(given[0], given[1])
+    if isinstance(value, Table):
+        curve = value
+    elif isinstance(value, (tuple, list)) and len(value) == 2:
+        curve = Table(value[0], value[1])
     else:
         raise ArrayDataError(
             "a curve is needed, as in "

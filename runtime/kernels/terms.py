@@ -35,15 +35,15 @@ class TermValues:
         return TermValues(np.array(values, dtype=np.float64))
 
 
-def terms_of(array: RunTimeArray, given: Any) -> TermValues:
+def terms_of(array: RunTimeArray, value: Any) -> TermValues:
     """Numbers that a user gave.  Raises `ArrayDataError`."""
     try:
-        numbers = np.array(given, dtype=np.float64)
+        numbers = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
         numbers = np.array(np.nan)
     if numbers.ndim != 1 or not len(numbers) or not np.isfinite(numbers).all():
         raise ArrayDataError(
             f"one finite number for each term is needed, as in {array.name}=[0.3, 0.2, 0.1]; given "
-            f"{given!r}"
+            f"{value!r}"
         )
     return TermValues(numbers)

@@ -885,14 +885,14 @@ def _lengths(name: str, size: Sequence[Any], dimension: int) -> tuple[float, ...
     """Lengths of a rectangle or box that are given as numbers or as one sequence."""
     lengths = size[0] if len(size) == 1 else size
     try:
-        found = tuple(map(float, lengths))
+        sizes = tuple(map(float, lengths))
     except (TypeError, ValueError):
-        found = ()
-    if len(found) != dimension:
+        sizes = ()
+    if len(sizes) != dimension:
         text = ", ".join(map(repr, size))
         example = ", ".join(("10", "1", "1")[:dimension])
         raise MeshError(f"{name}({text}): {dimension} lengths are needed, as in {name}({example})")
-    return found
+    return sizes
 
 
 def _frozen(name: str, array: Any) -> NDArray[Any]:

@@ -45,30 +45,30 @@ def frame(
     order: int,
 ) -> Mesh:
     """Straight members between points.  Raises MeshError."""
-    ends = np.array(points, dtype=np.float64)
-    if ends.ndim != 2 or ends.shape[1] not in (2, 3) or not np.isfinite(ends).all():
+    corners = np.array(points, dtype=np.float64)
+    if corners.ndim != 2 or corners.shape[1] not in (2, 3) or not np.isfinite(corners).all():
         raise MeshError("points: (x, y) or (x, y, z) of two points or more are needed")
     if members is None:
-        members = [(i, i + 1) for i in range(len(ends) - 1)]
+        members = [(i, i + 1) for i in range(len(corners) - 1)]
     groups = members if isinstance(members, Mapping) else {"": members}
     pairs = [(int(i), int(j)) for group in groups.values() for i, j in group]
     count = count_of(cells)
     if not count:
         raise MeshError(f"cells = {cells}: a whole number of at least 1 is needed")
     kind = _kind(1, order, "quad")
-    rows, nodes, total = [], [ends], len(ends)
+    rows, nodes, total = [], [corners], len(corners)
     along = _axis(1.0, count, order)[1:-1, None]
     numbers = _numbers(kind, [count], order)
     for i, j in pairs:
-        if not (0 <= i < len(ends) and 0 <= j < len(ends)):
-            raise MeshError(f"member ({i}, {j}): the points are numbered 0 to {len(ends) - 1}")
-        if np.allclose(ends[i], ends[j], rtol=1e-12, atol=0.0):
+        if not (0 <= i < len(corners) and 0 <= j < len(corners)):
+            raise MeshError(f"member ({i}, {j}): the points are numbered 0 to {len(corners) - 1}")
+        if np.allclose(corners[i], corners[j], rtol=1e-12, atol=0.0):
             raise MeshError(f"member ({i}, {j}): its points are at one place")
-        nodes.append(ends[i] + along * (ends[j] - ends[i]))
-        own = np.concatenate([[i], np.arange(total, total + len(along)), [j]])
-        rows.append(own[numbers])
+        nodes.append(corners[i] + along * (corners[j] - corners[i]))
+        member_nodes = np.concatenate([[i], np.arange(total, total + len(along)), [j]])
+        rows.append(member_nodes[numbers])
         total += len(along)
-    lonely = sorted(set(range(len(ends))) - {n for pair in pairs for n in pair})
+    lonely = sorted(set(range(len(corners))) - {n for pair in pairs for n in pair})
     if lonely:
         raise MeshError(f"point {lonely[0]} has no member")
     starts = count * np.cumsum([0, *map(len, groups.values())])

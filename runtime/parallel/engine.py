@@ -23,21 +23,21 @@ from softehl.runtime.solve.newton import Newton
 
 @dataclass(eq=False)
 class MultigridModesCommunicator(Communicator):
-    """Communicator of one process, with modes by multigrid. near: near null space."""
+    """Communicator of one process, with modes by multigrid. nullspace: near null space."""
 
-    near: NearNullspace
+    nullspace: NearNullspace
 
     def lowest_modes(
         self, problem: Problem, K: csc_array, M: csc_array, count: int
     ) -> tuple[Array, Array]:
         """See `Communicator`."""
-        return lowest_modes(symmetric(problem.eliminated(K)), symmetric(M), self.near, count)
+        return lowest_modes(symmetric(problem.eliminated(K)), symmetric(M), self.nullspace, count)
 
 
 class Engine(Protocol):
     """Distributes the equations of a study, and provides their linear solver."""
 
-    def spread(self, system: System) -> System:
+    def distribute(self, system: System) -> System:
         """The part of the equations that this process has; see `Communicator`."""
         ...
 
@@ -60,7 +60,7 @@ class Serial:
     linear: Linear = "auto"
     note: Callable[[], str] = str
 
-    def spread(self, system: System) -> System:
+    def distribute(self, system: System) -> System:
         """See `Engine`."""
         system.mesh.require_whole('engine = "serial"')
         nullspace = modes_by_multigrid(system, self.linear)

@@ -88,7 +88,7 @@ class MatrixFree:
                 f"{self.threads!r}): allowed are 0 < tolerance < 1, most >= 1, threads >= 1 or None"
             )
 
-    def spread(self, system: System) -> System:
+    def distribute(self, system: System) -> System:
         """See `Engine`.  Raises StudyError for what it cannot solve."""
         system.mesh.require_whole(_WHO)
         pages, order = require_products(system)

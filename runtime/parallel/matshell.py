@@ -189,11 +189,11 @@ class MatrixFreeShell:
         return petsc().NullSpace().create(vectors=vectors, comm=world())
 
 
-def _matrix(places: tuple[Integers, Integers], values: Array, sizes: Any, block: int) -> Any:
+def _matrix(positions: tuple[Integers, Integers], values: Array, sizes: Any, block: int) -> Any:
     """Of entries at PETSc's rows and columns, sums where there are several."""
     matrix = petsc().Mat().create(comm=world())
     matrix.setSizes(sizes, block)
     matrix.setType("aij")
-    matrix.setPreallocationCOO(*(part.astype(petsc().IntType) for part in places))
+    matrix.setPreallocationCOO(*(part.astype(petsc().IntType) for part in positions))
     matrix.setValuesCOO(values, petsc().InsertMode.INSERT_VALUES)
     return matrix

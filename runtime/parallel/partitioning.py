@@ -210,11 +210,11 @@ def part_of(system: System, partition: Partition, process: int) -> LocalSystem:
     )
 
 
-def _numbering(whole: Numbering, local: Integers, elements: dict[str, Integers]) -> Numbering:
-    layout = whole.layout
+def _numbering(numbering: Numbering, local: Integers, elements: dict[str, Integers]) -> Numbering:
+    layout = numbering.layout
     counts = tuple(int((local[layout.part(name)] >= 0).sum()) for name in layout.names)
-    nodal = {name: _mapped(local, numbers) for name, numbers in whole.nodal.items()}
-    dofs = {name: local[numbers[elements[name]]] for name, numbers in whole.dofs.items()}
+    nodal = {name: _mapped(local, numbers) for name, numbers in numbering.nodal.items()}
+    dofs = {name: local[numbers[elements[name]]] for name, numbers in numbering.dofs.items()}
     return Numbering(replace(layout, counts=counts), nodal, dofs)
 
 

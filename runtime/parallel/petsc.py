@@ -58,7 +58,7 @@ class Petsc:
     def __post_init__(self) -> None:
         petsc()
 
-    def spread(self, system: System) -> System:
+    def distribute(self, system: System) -> System:
         """See `Engine`."""
         system = system.everywhere
         if system.contacts:

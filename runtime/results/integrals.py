@@ -42,9 +42,9 @@ def integral(result: Result, text: str, where: str | None, block: str | None) ->
     domain = _Domain.of(mesh, where)
     if block is None:
         _require_one_meaning(result, expression)
-    known = {*result.system.everywhere.numbering.nodal, *_AXES[: mesh.dimension], "t"}
-    known |= set(_NORMAL[: mesh.dimension]) if domain.is_side else set()
-    if block is None and set(expression.names) <= known and not _on_page(result, expression):
+    nodal_names = {*result.system.everywhere.numbering.nodal, *_AXES[: mesh.dimension], "t"}
+    nodal_names |= set(_NORMAL[: mesh.dimension]) if domain.is_side else set()
+    if block is None and set(expression.names) <= nodal_names and not _on_page(result, expression):
         return _over_mesh(result, expression, domain)
     total = 0.0
     for page in _blocks(result, expression, domain, block):
@@ -74,20 +74,20 @@ class _Domain:
 
     def contains(self, kind: str, nodes: Integers) -> Flags:
         """Which of the elements (n, k) of a kind lie in it."""
-        own = self.elements.get(kind)
-        if own is None or not len(own):
+        faces = self.elements.get(kind)
+        if faces is None or not len(faces):
             return np.zeros(len(nodes), dtype=bool)
-        if own is nodes:
+        if faces is nodes:
             return np.ones(len(nodes), dtype=bool)
-        return np.asarray(match_faces(nodes, own, nodes.shape[1]) >= 0)
+        return np.asarray(match_faces(nodes, faces, nodes.shape[1]) >= 0)
 
 
 def _require_one_meaning(result: Result, expression: Expression) -> None:
     """Raise StudyError where t, x, y or z is also an argument or field of a page."""
     mesh = result.system.mesh
     for b in result.system.everywhere.blocks.values():
-        own = {*b.parameters, *b.data, *b.kernel.fields}
-        for name in sorted({"t", *_AXES[: mesh.dimension]} & own & set(expression.names)):
+        faces = {*b.parameters, *b.data, *b.kernel.fields}
+        for name in sorted({"t", *_AXES[: mesh.dimension]} & faces & set(expression.names)):
             meaning = "the time or load factor" if name == "t" else "a coordinate"
             raise StudyError(
                 f"integral({expression.text!r}): {name!r} is {meaning}, and of block {b.name!r}: "
@@ -181,11 +181,11 @@ def _volumes(cell: Cell, node_points: Array, at: Array, *, ring: bool) -> Array:
 
 def _normals(cell: Cell, node_points: Array, at: Array) -> Array:
     """Unit normals (n, q, dim) of faces, outwards."""
-    slopes = np.einsum("qkd,nkc->nqcd", cell.gradient(at), node_points)
-    if slopes.shape[2] == 2:
-        normal = np.stack([slopes[:, :, 1, 0], -slopes[:, :, 0, 0]], axis=2)
+    gradients = np.einsum("qkd,nkc->nqcd", cell.gradient(at), node_points)
+    if gradients.shape[2] == 2:
+        normal = np.stack([gradients[:, :, 1, 0], -gradients[:, :, 0, 0]], axis=2)
     else:
-        normal = np.cross(slopes[..., 0], slopes[..., 1])
+        normal = np.cross(gradients[..., 0], gradients[..., 1])
     return np.asarray(normal / np.linalg.norm(normal, axis=2, keepdims=True))
 
 
@@ -204,16 +204,16 @@ def _blocks(
     every = list(result.system.everywhere.blocks.values())
     context = f"integral({expression.text!r})"
     if block is not None:
-        chosen = [b for b in every if block in (b.name, _base(b))]
-        if not chosen:
+        blocks_of_name = [b for b in every if block in (b.name, _base(b))]
+        if not blocks_of_name:
             names = list(dict.fromkeys(map(_base, every)))
             raise StudyError(
                 f"{context}: no block {block!r}{did_you_mean(block, names)}; there are "
                 f"{join_names(names)}"
             )
-        if not any(_inside(b, domain).any() for b in chosen):
+        if not any(_inside(b, domain).any() for b in blocks_of_name):
             raise StudyError(f"{context}: no element of {block!r} lies in {domain.where!r}")
-        return chosen
+        return blocks_of_name
     inside = [b for b in every if _inside(b, domain).any()]
     having = [b for b in inside if not _missing(result, b, expression.names)]
     if not having and len({_base(b) for b in inside}) == 1:
@@ -248,16 +248,16 @@ def _inside(block: Block, domain: _Domain) -> Flags:
 def _covered(nodes: Integers, block: Block) -> Flags:
     """Which elements (n, k) are those of a block."""
     facet = facet_nodes(block.kernel)
-    own = block.nodes if facet is None else block.nodes[:, facet]
-    if own is nodes or np.array_equal(own, nodes):
+    faces = block.nodes if facet is None else block.nodes[:, facet]
+    if faces is nodes or np.array_equal(faces, nodes):
         return np.ones(len(nodes), dtype=bool)
-    return np.asarray(match_faces(nodes, own, nodes.shape[1]) >= 0)
+    return np.asarray(match_faces(nodes, faces, nodes.shape[1]) >= 0)
 
 
 def _any_elements(blocks: Sequence[Block], kind: str, nodes: Integers, count: Integers) -> bool:
     """True if a cell without the values has elements of another page."""
-    rest = nodes[count == 0]
-    return any(_covered(rest, b).any() for b in blocks if b.kind == kind and len(rest))
+    uncovered = nodes[count == 0]
+    return any(_covered(uncovered, b).any() for b in blocks if b.kind == kind and len(uncovered))
 
 
 # values -----------------------------------------------------------------------------------------
@@ -283,26 +283,26 @@ def _values(
 ) -> dict[str, Array]:
     """Values (n, q) or broadcast to it, by name.  Raises StudyError."""
     fields = result.fields(block.name)
-    found: dict[str, Array] = {}
-    places = points.coordinates
+    values: dict[str, Array] = {}
+    coordinates = points.coordinates
     for name in names:
         if name in fields:
-            found[name] = fields[name]
+            values[name] = fields[name]
         elif name in (slot.name for slot in block.slots if slot.node is not None):
-            found[name] = _unknown(result, block, points, name)
+            values[name] = _unknown(result, block, points, name)
         elif name in block.kernel.point_data:
-            found[name] = result.state[block.name][:, :, block.kernel.point_data.index(name)]
+            values[name] = result.state[block.name][:, :, block.kernel.point_data.index(name)]
         elif name in block.data:
-            found[name] = block.data[name][:, None]
+            values[name] = block.data[name][:, None]
         elif name in block.parameters:
             value = block.parameters[name]
-            found[name] = np.asarray(value(result.t) if callable(value) else value)
-        elif name in _AXES[: places.shape[2]]:
-            found[name] = places[:, :, _AXES.index(name)]
+            values[name] = np.asarray(value(result.t) if callable(value) else value)
+        elif name in _AXES[: coordinates.shape[2]]:
+            values[name] = coordinates[:, :, _AXES.index(name)]
         elif name == "t":
-            found[name] = np.asarray(result.t)
-    rest = tuple(n for n in names if n not in found)
-    return {**found, **dict(zip(rest, _named(result, block, rest), strict=True))}
+            values[name] = np.asarray(result.t)
+    uncovered = tuple(n for n in names if n not in values)
+    return {**values, **dict(zip(uncovered, _named(result, block, uncovered), strict=True))}
 
 
 def _unknown(result: Result, block: Block, points: IntegrationPoints, name: str) -> Array:

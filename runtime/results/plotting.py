@@ -98,12 +98,12 @@ def _values(result: Result, name: str, block: str | None, recovery: str) -> tupl
     if block is not None:
         block_called(blocks, block)
     total, count = np.zeros((2, len(result.system.mesh.points)))
-    known: dict[str, None] = dict.fromkeys(nodal)
+    available: dict[str, None] = dict.fromkeys(nodal)
     for b in [block] if block is not None else list(blocks):
         if not blocks[b].kernel.fields or not CELLS[blocks[b].kind].dimension:
             continue
         fields = result.at_nodes(b, recovery=recovery)
-        known |= dict.fromkeys(fields)
+        available |= dict.fromkeys(fields)
         if name == VON_MISES and "sigma_xx" in fields:
             fields = {VON_MISES: von_mises(fields)}
         if name in fields:
@@ -114,9 +114,9 @@ def _values(result: Result, name: str, block: str | None, recovery: str) -> tupl
         if name == VON_MISES:
             raise StudyError(
                 f"plot: {VON_MISES} needs fields sigma_xx, sigma_yy, ... of the page; there are "
-                f"{join_names(known)}"
+                f"{join_names(available)}"
             )
-        names = [*known, *([VON_MISES] if "sigma_xx" in known else [])]
+        names = [*available, *([VON_MISES] if "sigma_xx" in available else [])]
         raise StudyError(
             f"plot: no unknown or field {name!r}{did_you_mean(name, names)}; there are "
             f"{join_names(names)}"
@@ -215,8 +215,8 @@ def plot_path(
     chart.line(values, np.array([r.t for r in results]), width=2.0)
     if limits:
         dof = system.numbering.nodal[name][node]
-        there = [limit.x[dof] for limit in limits], [limit.t for limit in limits]
-        chart.scatter(*there, color="r", size=8, label="limit points")
+        limit_points = [limit.x[dof] for limit in limits], [limit.t for limit in limits]
+        chart.scatter(*limit_points, color="r", size=8, label="limit points")
     plotter = new_plotter(off_screen=file is not None)
     plotter.add_chart(chart)
     show_or_save(plotter, file)

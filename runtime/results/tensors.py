@@ -70,16 +70,16 @@ def principal_values(fields: Mapping[str, Array | float], name: str = "sigma") -
 
 def _components(fields: Mapping[str, Array | float], name: str) -> list[Array]:
     """The six components, as arrays of one shape; shears out of the plane are zero if not given."""
-    given = {}
+    components = {}
     for c in _COMPONENTS:
         label = f"{name}_{c}"
         label = label if label in fields else f"{name}_{_EXCHANGED.get(c, c)}"
         if label in fields:
-            given[c] = np.asarray(fields[label], dtype=np.float64)
-    missing = [f"{name}_{c}" for c in ("xx", "yy", "zz", "xy") if c not in given]
+            components[c] = np.asarray(fields[label], dtype=np.float64)
+    missing = [f"{name}_{c}" for c in ("xx", "yy", "zz", "xy") if c not in components]
     if missing:
         raise UnknownNameError(
             f"no field {join_names(missing)}; there are {join_names(fields)}. Give what "
             f"is missing, such as {{**fields, {missing[0]!r}: 0.0}}"
         )
-    return list(np.broadcast_arrays(*(given.get(c, np.zeros(())) for c in _COMPONENTS)))
+    return list(np.broadcast_arrays(*(components.get(c, np.zeros(())) for c in _COMPONENTS)))

@@ -58,8 +58,8 @@ class ElementCurvatures:
     def gradient(self, adjoint: Adjoints) -> Variation:
         """Derivatives of L by all arguments: its rates as the adjoint grows from zero."""
         elements = self._elements
-        still = Variation(elements.zero_rows(), np.zeros_like(elements.dofs))
-        return self.rates(Adjoints(np.zeros_like(adjoint.residual)), still, adjoint)
+        at_rest = Variation(elements.zero_rows(), np.zeros_like(elements.dofs))
+        return self.rates(Adjoints(np.zeros_like(adjoint.residual)), at_rest, adjoint)
 
     def _of_page(self, adjoint: Adjoints, along: Variation, adjoint_rate: Adjoints) -> Variation:
         elements, block = self._elements, self._elements.block
@@ -114,17 +114,17 @@ class ElementCurvatures:
         by_dofs += amounts[:, None] * np.einsum("nij,ni->nj", K_one - K_none, left)
         if isinstance(kernel, Pressure):
             by_dofs += self._slope(forces, coordinates, along.dofs)
-        rows, still = elements.zero_rows(), np.zeros_like(u)
+        rows, at_rest = elements.zero_rows(), np.zeros_like(u)
         rows[:, width] = work(one, left_rate)(X, u) - work(none, left_rate)(X, u)
         rows[:, width] += np.einsum("ni,nij,nj->n", left, K_one - K_none, along.dofs)
         if coordinates.any():
-            rows[:, width] += self._slope(unit, coordinates, still)
+            rows[:, width] += self._slope(unit, coordinates, at_rest)
         for j in self._columns:
             if j < width:
                 axis = np.zeros_like(X)
                 axis[:, j] = 1.0
-                rows[:, j] = self._slope(work(kernel, left_rate), axis, still)
-                rows[:, j] += amounts * self._slope(unit, axis, still)
+                rows[:, j] = self._slope(work(kernel, left_rate), axis, at_rest)
+                rows[:, j] += amounts * self._slope(unit, axis, at_rest)
                 rows[:, j] += self._bend(work(kernel, left), axis, (coordinates, along.dofs))
         return Variation(rows, by_dofs)
 

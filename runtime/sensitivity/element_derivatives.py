@@ -64,9 +64,9 @@ class ElementDerivatives:
         """
         law = self.block.kernel
         if isinstance(law, PairLawKernel):
-            given = {"data": self.block.data, "parameters": self.parameters}
+            arguments = {"data": self.block.data, "parameters": self.parameters}
             direction = rows[:, self.coordinates :]
-            return law.rate(self.block.coordinates, self.dofs, direction, **given)
+            return law.rate(self.block.coordinates, self.dofs, direction, **arguments)
         if self.page is None:
             return self._load(rows)
         kernel = self._kernel("pseudo_load")

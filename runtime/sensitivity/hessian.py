@@ -83,7 +83,7 @@ class _AdjointState:
 class _Record:
     """State before a step along a direction, and the rates of the unknowns in it, (n,)."""
 
-    before: DirectState
+    previous: DirectState
     unknowns: Array
 
 
@@ -127,8 +127,8 @@ class _Path:
         for tape in self.chain:
             step, moves, row = LinearisedStep(tape), self.moves(tape), []
             for seed, state in zip(directions.T, states, strict=True):
-                before = DirectState(list(state.states), dict(state.histories))
-                row.append(_Record(before, tangent_step(step, moves, seed, state)[0]))
+                previous = DirectState(list(state.states), dict(state.histories))
+                row.append(_Record(previous, tangent_step(step, moves, seed, state)[0]))
             records.append(row)
         return records
 
@@ -189,7 +189,7 @@ class _Back:
         gradients = {name: self._curvatures[name].gradient(a) for name, a in of_history.items()}
         slope += self._by_unknowns(gradients)
         adjoint = step.adjoint(slope)
-        self._held = slope - step.transposed_times(adjoint)
+        self._at_supports = slope - step.transposed_times(adjoint)
         acting = step.reacting()
         self.adjoints = {
             name: self._adjoints(weights - adjoint if name in acting else -adjoint, name, state)
@@ -204,12 +204,12 @@ class _Back:
     ) -> _AdjointState:
         """Add the part of this step to the product (k,); return the rates before the step."""
         step, dx, none = self.step, record.unknowns, np.zeros(len(record.unknowns))
-        rows = argument_rates(step, self._moves, direction, record.before)
+        rows = argument_rates(step, self._moves, direction, record.previous)
         along = {
             name: Variation(
                 rows.get(name, elements.zero_rows()),
                 dx[elements.block.dofs],
-                record.before.histories.get(name),
+                record.previous.histories.get(name),
             )
             for name, elements in step.blocks.items()
         }
@@ -217,13 +217,13 @@ class _Back:
         for term in self._terms:
             slope += term.weight * term.quantity.curvature(step, dx)
         adjoint = step.adjoint(slope)
-        held = slope - step.transposed_times(adjoint)
+        at_supports = slope - step.transposed_times(adjoint)
         rates = self._rates(along, -adjoint, state)
         for column in self._moves.columns:
             if column.block in rates:
                 column.pull(product, rates[column.block].rows[:, column.column])
-        self._moves.pull_prescribed(product, held)
-        self.path.bends(step.tape, direction).pull_prescribed(product, self._held)
+        self._moves.pull_prescribed(product, at_supports)
+        self.path.bends(step.tape, direction).pull_prescribed(product, self._at_supports)
         return self.previous(state, rates)
 
     def previous(self, state: _AdjointState, gradients: Mapping[str, Variation]) -> _AdjointState:

@@ -46,10 +46,10 @@ class InputColumn:
         mask = self.target >= 0
         rows[mask, self.column] += self.factor[mask] * seed[self.target[mask]]
 
-    def pull(self, gradient: Array, slopes: Array) -> None:
+    def pull(self, gradient: Array, gradient_of_dofs: Array) -> None:
         """Add the derivatives (n,) by the argument to the gradient."""
         mask = self.target >= 0
-        np.add.at(gradient, self.target[mask], self.factor[mask] * slopes[mask])
+        np.add.at(gradient, self.target[mask], self.factor[mask] * gradient_of_dofs[mask])
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,11 +117,11 @@ class InputSeeds:
     arrays: Sequence[ArraySeeds] = field(default=())
     points: Sequence[PointSeeds] = field(default=())
 
-    def pull_prescribed(self, gradient: Array, slopes: Array) -> None:
+    def pull_prescribed(self, gradient: Array, gradient_of_dofs: Array) -> None:
         """Add derivatives (n,) by prescribed values to the gradient."""
         for h in self.prescribed:
             mask = h.target >= 0
-            np.add.at(gradient, h.target[mask], h.factor[mask] * slopes[h.dofs[mask]])
+            np.add.at(gradient, h.target[mask], h.factor[mask] * gradient_of_dofs[h.dofs[mask]])
 
 
 Key: TypeAlias = tuple[str, str]
@@ -217,16 +217,16 @@ class LawParameter:
     @property
     def value(self) -> Array:
         """See `Input`."""
-        return np.array([_number(self._given)])
+        return np.array([_number(self._definition)])
 
     @property
-    def _given(self) -> Any:
+    def _definition(self) -> Any:
         assert self.request.law is not None
         return self.request.law.parameters[self.key[1]]
 
     def seeds(self, tape: Tape) -> InputSeeds:
         """See `Input`."""
-        rate = float(self._given(tape.step.t)) if callable(self._given) else 1.0
+        rate = float(self._definition(tape.step.t)) if callable(self._definition) else 1.0
         columns = []
         for block in tape.problem.assembler.blocks:
             if isinstance(block.kernel, PairLawKernel) and block.name.startswith(
@@ -241,7 +241,7 @@ class LawParameter:
         """See `Input`."""
         for k, contact in enumerate(definition.contacts):
             if contact.name == self.request.name:
-                changed = _changed(self._given, float(value[0]))
+                changed = _changed(self._definition, float(value[0]))
                 parameters = {**contact.law.parameters, self.key[1]: changed}
                 law = replace(contact.law, parameters=parameters)
                 definition.contacts[k] = replace(contact, law=law)
@@ -576,10 +576,10 @@ def _supports(item: Input, condition: PrescribedValues) -> bool:
 
 def _values(c: PrescribedValues, tape: Tape, *axes: Array) -> Callable[..., Array]:
     """Prescribed values (n,) at places that move along axes (n, dim)."""
-    places, step = tape.system.mesh.points[c.nodes], tape.step
+    points, step = tape.system.mesh.points[c.nodes], tape.step
 
     def values(*steps: float) -> Array:
-        moved = sum((s * axis for s, axis in zip(steps, axes, strict=True)), places)
+        moved = sum((s * axis for s, axis in zip(steps, axes, strict=True)), points)
         return amount(c.value, moved, step.t, step.factor)
 
     return values

@@ -87,8 +87,8 @@ class LinearisedStep:
 
     def forces(self) -> Array:
         """Forces (n,) that make reactions."""
-        found = self.tape.problem.assembler.residual(self.tape.x, self._others())
-        return np.asarray(found)
+        residual = self.tape.problem.assembler.residual(self.tape.x, self._others())
+        return np.asarray(residual)
 
     def by_unknowns(self, weights: Array) -> Array:
         """Derivative (n,) of weights (n,) times the forces that make reactions."""

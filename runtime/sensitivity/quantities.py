@@ -130,10 +130,10 @@ class ReactionSum:
         if self.side in bodies:
             return _force_on(bodies[self.side], self.name, system)
         _require(self.name, system)
-        dofs, found = system.numbering.nodal[self.name], np.zeros(system.size)
+        dofs, weights = system.numbering.nodal[self.name], np.zeros(system.size)
         side_dofs = dofs[system.mesh.nodes(self.side)]
-        found[side_dofs[side_dofs >= 0]] = 1.0
-        return found
+        weights[side_dofs[side_dofs >= 0]] = 1.0
+        return weights
 
     def curvature(self, step: LinearisedStep, dx: Array) -> Array:
         """See `Quantity`."""

@@ -60,13 +60,13 @@ class Tape:
     @property
     def problem(self) -> Problem:
         """Its equations, with a matrix."""
-        posed = (
+        problem = (
             self.distributed_problem.equations
             if isinstance(self.distributed_problem, WithoutMatrix)
             else self.distributed_problem
         )
-        assert isinstance(posed, Problem)
-        return posed
+        assert isinstance(problem, Problem)
+        return problem
 
     def chain(self) -> list[Tape]:
         """The steps on which the unknowns depend, first to last.

@@ -54,7 +54,7 @@ def test_the_map_of_a_level_has_the_first_unknown_of_a_group_as_master() -> None
     assert level.g.tolist() == [0.0, 0.0, 0.5, 0.0, 0.0]
     x = np.array([1.0, 2.0, 0.0, 0.0, 0.0])
     np.testing.assert_array_equal(level.square @ x, [1.0, 2.0, 0.0, 1.0, 0.0])
-    level.spread(x)
+    level.copy_to_slaves(x)
     assert x.tolist() == [1.0, 2.0, 0.0, 1.0, 0.0]
     level.collect(x)
     assert x[0] == 2.0

@@ -522,25 +522,25 @@ class _Mesh:
 
     def side(self, key: str, surface: _Surface) -> Side:
         """Faces of a surface; its nodes, where it is of nodes."""
-        found: Side = {}
+        entities: Side = {}
         if surface.kind == "UNION":
             for name, _ in surface.lines:
                 other = self.scopes[key].surfaces.get(name.upper())
                 if other is None or other is surface:
                     raise AbaqusError(f"{surface.location}: there is no surface {name!r}")
                 for kind, faces in self.side(key, other).items():
-                    found.setdefault(kind, []).extend(faces)
-            return found
+                    entities.setdefault(kind, []).extend(faces)
+            return entities
         for name, label in surface.lines:
             member = int(name) if name.isdigit() else name
             if surface.kind == "NODE":
                 nodes = [(n,) for n in self.one("NSET", key, member)]
-                found.setdefault("point1", []).extend(nodes)
+                entities.setdefault("point1", []).extend(nodes)
                 continue
             for element in self.one("ELSET", key, member):
                 for kind, face in self.faces(element, label, surface):
-                    found.setdefault(kind, []).append(face)
-        return found
+                    entities.setdefault(kind, []).append(face)
+        return entities
 
     def faces(
         self, element: int, label: str, surface: _Surface

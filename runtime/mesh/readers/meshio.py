@@ -326,8 +326,8 @@ def _families(
     point_families: dict[tuple[str, ...], int] = {(): 0}
     at = [point_families.setdefault(tuple(n), len(point_families)) for n in at_points]
     tags = {
-        attribute: {number: list(some) for some, number in known.items() if some}
-        for attribute, known in (("cell_tags", families), ("point_tags", point_families))
+        attribute: {number: list(some) for some, number in names_by_number.items() if some}
+        for attribute, names_by_number in (("cell_tags", families), ("point_tags", point_families))
     }
     turned = {
         kind: nodes[:, list(CELLS[kind].mirrored)] if CELLS[kind].dimension == 3 else nodes

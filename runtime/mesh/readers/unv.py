@@ -213,13 +213,13 @@ def _read_group(model: _Model, lines: Iterator[str]) -> None:
 
 def _content(model: _Model) -> Content:
     cells: dict[str, Integers] = {}
-    place: dict[str, Integers] = {}
+    positions: dict[str, Integers] = {}
     for kind, rows in model.rows.items():
         absent = next((n for row in rows for n in row if n not in model.nodes), None)
         if absent is not None:
             raise UnvError(f"a {kind} has node {absent}, which is not in the file")
         numbers = np.array([[model.nodes[n][1] for n in row] for row in rows])
-        first, place[kind] = first_occurrences(numbers)
+        first, positions[kind] = first_occurrences(numbers)
         cells[kind] = numbers[first]
     names: dict[str, dict[str, Integers]] = {}
     sides: dict[str, dict[str, Integers]] = {}
@@ -229,7 +229,7 @@ def _content(model: _Model) -> Content:
             if label not in model.elements:
                 raise UnvError(f"group {name!r} has element {label}, which is not in the file")
             kind, row = model.elements[label]
-            by_kind.setdefault(kind, []).append(int(place[kind][row]))
+            by_kind.setdefault(kind, []).append(int(positions[kind][row]))
         names[name] = {kind: np.unique(rows) for kind, rows in by_kind.items()}
         if _NODE in members:
             absent = next((n for n in members[_NODE] if n not in model.nodes), None)
