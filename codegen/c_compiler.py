@@ -34,17 +34,17 @@ def compiler() -> list[str]:
     """The C compiler as a command; `cc` where there is none.  Raises BuildError."""
     command = os.environ.get("CC", "")
     try:
-        words = shlex.split(command, posix=os.name != "nt")
+        arguments = shlex.split(command, posix=os.name != "nt")
     except ValueError as error:
         reason = str(error)[:1].lower() + str(error)[1:]
         raise BuildError(
             f"CC={command!r} is no command ({reason}): set CC to a C compiler"
         ) from None
-    if words:
-        return [word.strip('"') for word in words]
-    found = next(filter(_is_installed, SYSTEM), None)
-    if found is not None:
-        return [found]
+    if arguments:
+        return [word.strip('"') for word in arguments]
+    compiler = next(filter(_is_installed, SYSTEM), None)
+    if compiler is not None:
+        return [compiler]
     zig = ziglang()
     if zig is None:
         return ["cc"]
@@ -66,8 +66,8 @@ def supported(command: Sequence[str], flags: Sequence[str]) -> list[str]:
         flags = [f for f in flags if f != "-fPIC"]
     if not is_zig(command):
         return list(flags)
-    kept = [f.replace("x86-64", "x86_64") for f in flags if f not in GCC_ALONE]
-    return [*kept, "-fno-sanitize=undefined"]  # which it would add to -O0 and -O1
+    common = [f.replace("x86-64", "x86_64") for f in flags if f not in GCC_ALONE]
+    return [*common, "-fno-sanitize=undefined"]  # which it would add to -O0 and -O1
 
 
 def is_zig(command: Sequence[str]) -> bool:

@@ -33,8 +33,8 @@ from softehl.codegen.derive import (
     potential_structure,
     task_outputs,
 )
-from softehl.codegen.derive.output_entries import Entry, replace_values
-from softehl.codegen.derive.potential_structure import Structure
+from softehl.codegen.derive.output_entries import OutputEntry, replace_values
+from softehl.codegen.derive.potential_structure import PotentialStructure
 from softehl.codegen.derive.task_outputs import Variant
 from softehl.codegen.emit import (
     c_printer,
@@ -58,7 +58,7 @@ from softehl.codegen.emit.points import (
 )
 from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_kernel import Choice, choose
-from softehl.codegen.emit.points.point_layout import Layout, Needs
+from softehl.codegen.emit.points.point_layout import Needs, PointLayout
 from softehl.codegen.graph.graph import Routine
 from softehl.codegen.graph.traversal import operations
 from softehl.codegen.language.definition import Definition, functions_of_user
@@ -77,7 +77,7 @@ class Attempt:
 
     rule: str
     unrolled: bool
-    entries: list[Entry]
+    entries: list[OutputEntry]
     passes: list[passes.TraceRow]
     plan: Schedule
     operations: int
@@ -95,7 +95,7 @@ class Function:
     text: str
     plan: Schedule
     temporaries: int
-    structure: Structure | None
+    structure: PotentialStructure | None
     attempts: tuple[Attempt, ...]
     best: Attempt
     printer: str
@@ -174,7 +174,7 @@ def _with_action(made: KernelSource) -> KernelSource:
     d = made.definition
     if d.point is None or Task.PRODUCT not in made.functions:
         return made
-    layout = Layout(d, d.point)
+    layout = PointLayout(d, d.point)
     if not sum_factored_product.fits(layout):
         return made
     outputs, plan, called = _ordered(layout, Task.PRODUCT)
@@ -194,7 +194,7 @@ def device_kernels(d: Definition) -> DeviceKernels:
     """Kernels of a page of fields for a device.  Raises TargetError for a page without."""
     if d.point is None:
         raise TargetError(f"{d.name} is no page of fields: a device has kernels of such pages only")
-    layout = Layout(d, d.point)
+    layout = PointLayout(d, d.point)
     device.require(layout)
     tasks = (Task.RESIDUAL, Task.PRODUCT, Task.TANGENT)
     return DeviceKernels(layout, {task: _ordered(layout, task) for task in tasks})
@@ -218,7 +218,7 @@ def _form(d: Definition) -> tuple[Choice, Attempt | None]:
         return Choice(False, why), None
     attempt = _moduli(site, Task.TANGENT)
     outputs = PointOutputs(attempt.entries)
-    return choose(Layout(d, d.point), outputs, attempt.operations, SHORT), attempt
+    return choose(PointLayout(d, d.point), outputs, attempt.operations, SHORT), attempt
 
 
 def _moduli(site: Definition, task: str) -> Attempt:
@@ -235,7 +235,7 @@ def _moduli_alone(site: Definition) -> Attempt:
 def _at_points(d: Definition, tasks: Sequence[str], tangent: Attempt | None) -> KernelSource:
     """All kernels of a weak form, as loops around functions of the point."""
     assert d.point is not None
-    layout = Layout(d, d.point)
+    layout = PointLayout(d, d.point)
     functions = {t: _at_point(layout, t, tangent if t == Task.TANGENT else None) for t in tasks}
     files = []
     for some in ([t for t in tasks if t not in DESIGN], [t for t in tasks if t in DESIGN]):
@@ -251,7 +251,7 @@ def _at_points(d: Definition, tasks: Sequence[str], tangent: Attempt | None) -> 
     return KernelSource(d, files[0], functions, files[1], shared)
 
 
-def _at_point(layout: Layout, task: str, attempt: Attempt | None) -> Function:
+def _at_point(layout: PointLayout, task: str, attempt: Attempt | None) -> Function:
     """One kernel of a weak form: the function of a point and the loops of the cell.
 
     attempt: its outputs at a point, where they are known.
@@ -267,7 +267,7 @@ def _at_point(layout: Layout, task: str, attempt: Attempt | None) -> Function:
     )
 
 
-def _at_centroid(layout: Layout, task: str, point: PointOutputs) -> point_kernel.At | None:
+def _at_centroid(layout: PointLayout, task: str, point: PointOutputs) -> point_kernel.At | None:
     """Values at the centroid that the function of a point reads, None if it reads none."""
     form, needs = layout.form, Needs.of(point.entries)
     first = point_outputs.first_rate(form.definition, task)
@@ -281,7 +281,7 @@ def _at_centroid(layout: Layout, task: str, point: PointOutputs) -> point_kernel
 
 
 def _ordered(
-    layout: Layout, task: str, attempt: Attempt | None = None
+    layout: PointLayout, task: str, attempt: Attempt | None = None
 ) -> tuple[PointOutputs, Schedule, tuple[Routine, ...]]:
     """Outputs of a task at a point, statements in the printed order, and routines they call."""
     site = layout.site
@@ -349,7 +349,9 @@ def _attempts(d: Definition, task: str, alternatives: Sequence[Variant]) -> Iter
         yield from (_attempt(d, variant, unrolled=True) for variant in alternatives)
 
 
-def _by_products(d: Definition, task: str, structure: Structure | None) -> tuple[Attempt, ...]:
+def _by_products(
+    d: Definition, task: str, structure: PotentialStructure | None
+) -> tuple[Attempt, ...]:
     """A large tangent as loops over products at the points; nothing for any other one."""
     size = len(d.unknowns)
     if task != Task.TANGENT or size < point_products.FEW or d.unroll:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from softehl.codegen.derive.linear_interfaces import LinearInterface
 from softehl.codegen.derive.multilevel_chain_rule import Linearisation
-from softehl.codegen.derive.output_entries import Entry, Slot
-from softehl.codegen.derive.potential_structure import Structure
+from softehl.codegen.derive.output_entries import OutputEntry, OutputSlot
+from softehl.codegen.derive.potential_structure import PotentialStructure
 from softehl.codegen.graph.differentiation import PrescribedDerivatives, gradient
 from softehl.codegen.graph.graph import FREE, Graph, Node
 from softehl.codegen.graph.guarded_products import Certain
@@ -16,12 +16,12 @@ from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 
 
-def by_levels(d: Definition, s: Structure) -> ModalChainRule:
+def by_levels(d: Definition, s: PotentialStructure) -> ModalChainRule:
     """Level by level: quadratic values, linear forms, point values, modal coordinates."""
     return ModalChainRule(d, s, (s.forms, s.squares))
 
 
-def by_derivatives(d: Definition, s: Structure) -> ModalChainRule:
+def by_derivatives(d: Definition, s: PotentialStructure) -> ModalChainRule:
     """Chain rule that skips the linear forms: derivatives of the top interface by point values."""
     inner = {*s.squares, *s.forms}
     upper = tuple(
@@ -58,7 +58,7 @@ class ModalChainRule:
     """
 
     d: Definition
-    s: Structure
+    s: PotentialStructure
     upper: tuple[tuple[Node, ...], ...]
     derivatives: PrescribedDerivatives = field(default_factory=dict)
 
@@ -72,13 +72,13 @@ class ModalChainRule:
             named=[*self.s.interface.point, *(n for level in self.upper for n in level)],
         )
 
-    def residual(self) -> list[Entry]:
+    def residual(self) -> list[OutputEntry]:
         """R_i = sum of V_ki dPi/dm_k."""
         adjoint = self._adjoint()
         rows = self._at_unknowns([adjoint[m] for m in self.s.interface.modes])
-        return [Entry(Slot(False, i), None, n) for i, n in enumerate(rows)]
+        return [OutputEntry(OutputSlot(False, i), None, n) for i, n in enumerate(rows)]
 
-    def tangent(self) -> list[Entry]:
+    def tangent(self) -> list[OutputEntry]:
         """K_ij = sum of V_ki (d2 Pi / dm_k dm_l) V_lj."""
         modal = self._modal_tangent()
         half = [self._at_unknowns(row) for row in modal]
@@ -86,7 +86,11 @@ class ModalChainRule:
         size = range(len(full))
         upper = self.d.conservative
         return [
-            Entry(Slot(False, i), Slot(False, j), full[i][j] if upper and j < i else full[j][i])
+            OutputEntry(
+                OutputSlot(False, i),
+                OutputSlot(False, j),
+                full[i][j] if upper and j < i else full[j][i],
+            )
             for i in size
             for j in size
         ]

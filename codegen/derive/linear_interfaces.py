@@ -18,7 +18,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.graph.graph import Graph, InputEntry, Node, Op
 from softehl.codegen.graph.polynomial import Monomial, Polynomial, added, product, value
 from softehl.codegen.graph.traversal import reachable
 
@@ -60,7 +60,7 @@ def forms(roots: Sequence[Node], degree: Mapping[Node, int]) -> list[Node]:
 
 
 def _parent(n: Node) -> bool:
-    return isinstance(n.payload, Input) and n.payload.array == "rule"
+    return isinstance(n.payload, InputEntry) and n.payload.array == "rule"
 
 
 @dataclass

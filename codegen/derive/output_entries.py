@@ -10,14 +10,14 @@ from typing import NamedTuple
 from softehl.codegen.graph.graph import Node
 
 
-class Slot(NamedTuple):
+class OutputSlot(NamedTuple):
     """A row or column: a direct unknown, or a component (value, xi-derivative) of the basis."""
 
     basis: bool
     position: int
 
 
-class Array(Enum):
+class OutputArray(Enum):
     """Place of an entry; the last three: of a tangent by products (`point_products`)."""
 
     OUTPUT = ""
@@ -27,15 +27,15 @@ class Array(Enum):
 
 
 @dataclass(frozen=True)
-class Entry:
+class OutputEntry:
     """One output value and where it goes."""
 
-    row: Slot
-    column: Slot | None
+    row: OutputSlot
+    column: OutputSlot | None
     node: Node
-    array: Array = Array.OUTPUT
+    array: OutputArray = OutputArray.OUTPUT
 
 
-def replace_values(entries: Sequence[Entry], roots: Sequence[Node]) -> list[Entry]:
+def replace_values(entries: Sequence[OutputEntry], roots: Sequence[Node]) -> list[OutputEntry]:
     """Entries with new values in the same rows and columns."""
     return [replace(x, node=n) for x, n in zip(entries, roots, strict=True)]

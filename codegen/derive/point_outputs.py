@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from softehl.codegen.abi import Task, derivative_task
 from softehl.codegen.derive import task_outputs
-from softehl.codegen.derive.output_entries import Entry, Slot
+from softehl.codegen.derive.output_entries import OutputEntry, OutputSlot
 from softehl.codegen.derive.task_outputs import argument_seeds, unknown_seeds
 from softehl.codegen.graph.differentiation import directional, gradient
 from softehl.codegen.graph.graph import Node
@@ -15,7 +15,7 @@ RATES = 1000
 """First row of the rates of fluxes, which the task `pseudo_load` needs beside the fluxes."""
 
 
-def outputs(d: Definition, task: str) -> list[Entry]:
+def outputs(d: Definition, task: str) -> list[OutputEntry]:
     """Output nodes of a task of the model at a point.
 
     Of `pseudo_load` the fluxes, and from the row `RATES` on their rates when coordinates, data,
@@ -28,10 +28,10 @@ def outputs(d: Definition, task: str) -> list[Entry]:
         by = argument(d, task)
         assert by is not None
         rates = directional(d.graph, [x.node for x in rows], {by: d.graph.one}, d.prescribed)
-        return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
+        return [OutputEntry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
     seeds = {**argument_seeds(d), **unknown_seeds(d, first_rate(d, task))}
     rates = directional(d.graph, [x.node for x in rows], seeds, d.prescribed)
-    return rows + [Entry(Slot(False, RATES + k), None, n) for k, n in enumerate(rates)]
+    return rows + [OutputEntry(OutputSlot(False, RATES + k), None, n) for k, n in enumerate(rates)]
 
 
 def first_rate(d: Definition, task: str) -> int:
@@ -39,23 +39,25 @@ def first_rate(d: Definition, task: str) -> int:
     return 0 if task == Task.PRODUCT else d.coordinate_width + len(d.data) + len(d.parameters)
 
 
-def at_centroid(form: PointForm, task: str) -> list[Entry]:
+def at_centroid(form: PointForm, task: str) -> list[OutputEntry]:
     """Values at the centroid; for a tangent also their derivatives by what the fields are there,
     with columns numbered as in `form.all`, and for tasks along `direction` their rates.
     """
     d, values = form.definition, list(form.centroid.values())
-    g, rows = d.graph, [Entry(Slot(False, k), None, n) for k, n in enumerate(values)]
+    g, rows = d.graph, [OutputEntry(OutputSlot(False, k), None, n) for k, n in enumerate(values)]
     dofs = {k: g.input("dofs", k) for k in range(len(form.all)) if k not in form.centroid}
     if task == Task.TANGENT:
         for x in rows:
             derivatives = gradient(g, x.node, list(dofs.values()), prescribed=d.prescribed)
-            rows = rows + [Entry(x.row, Slot(False, k), derivatives[n]) for k, n in dofs.items()]
+            rows = rows + [
+                OutputEntry(x.row, OutputSlot(False, k), derivatives[n]) for k, n in dofs.items()
+            ]
     elif task in (Task.PRODUCT, Task.PSEUDO_LOAD, Task.FIELDS_RATE):
         first = first_rate(d, task)
         seeds = {} if task == Task.PRODUCT else argument_seeds(d)
         seeds |= {n: g.input("direction", first + k) for k, n in dofs.items()}
         rates = directional(g, values, seeds, d.prescribed)
-        rows += [Entry(Slot(False, RATES + k), None, n) for k, n in enumerate(rates)]
+        rows += [OutputEntry(OutputSlot(False, RATES + k), None, n) for k, n in enumerate(rates)]
     return rows
 
 

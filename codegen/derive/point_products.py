@@ -17,7 +17,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from softehl.codegen.derive.output_entries import Array, Entry, Slot
+from softehl.codegen.derive.output_entries import OutputArray, OutputEntry, OutputSlot
 from softehl.codegen.derive.potential_structure import degrees
 from softehl.codegen.graph.differentiation import Dependence, gradient
 from softehl.codegen.graph.graph import Graph, Node, Op
@@ -33,7 +33,7 @@ LARGE = 8_000
 in some seconds."""
 
 
-def outputs(d: Definition, residual: Sequence[Entry]) -> list[Entry] | None:
+def outputs(d: Definition, residual: Sequence[OutputEntry]) -> list[OutputEntry] | None:
     """Return the residual, B, M and what is added to their products; None where it does not fit.
 
     Left out are potentials that are no sum of integrals, prescribed derivatives, and models whose
@@ -72,11 +72,15 @@ def outputs(d: Definition, residual: Sequence[Entry]) -> list[Entry] | None:
     at = iter(new)
     entries = [*residual]
     entries += [
-        Entry(Slot(False, i), Slot(False, j), next(at), Array.MODULI) for i, j in nonzero_moduli
+        OutputEntry(OutputSlot(False, i), OutputSlot(False, j), next(at), OutputArray.MODULI)
+        for i, j in nonzero_moduli
     ]
-    entries += [Entry(Slot(False, i), Slot(False, j), next(at), Array.ADDED) for i, j in curved]
     entries += [
-        Entry(Slot(False, k), Slot(False, j), row[u], Array.SLOPES)
+        OutputEntry(OutputSlot(False, i), OutputSlot(False, j), next(at), OutputArray.ADDED)
+        for i, j in curved
+    ]
+    entries += [
+        OutputEntry(OutputSlot(False, k), OutputSlot(False, j), row[u], OutputArray.SLOPES)
         for k, row in enumerate(b_matrix)
         for j, u in enumerate(d.directions)
         if row[u] is not g.zero
@@ -89,7 +93,7 @@ def is_vast(d: Definition) -> bool:
     return operations([d.potential]) * len(d.unknowns) > VAST
 
 
-def is_large(tangent: Sequence[Entry]) -> bool:
+def is_large(tangent: Sequence[OutputEntry]) -> bool:
     """True if a tangent that is written out entry by entry is long."""
     return operations([x.node for x in tangent]) > LARGE
 
@@ -230,7 +234,7 @@ def _hessian(g: Graph, value: Node, unknowns: Sequence[Node]) -> dict[tuple[int,
     return {at: n for at, n in lower.items() if n is not g.zero}
 
 
-def _fixed(d: Definition, remainder: Node) -> list[Entry]:
+def _fixed(d: Definition, remainder: Node) -> list[OutputEntry]:
     """Second derivatives of what is no integral."""
     g = d.graph
     rows = gradient(g, remainder, d.directions, constant=d.constant)
@@ -238,7 +242,7 @@ def _fixed(d: Definition, remainder: Node) -> list[Entry]:
     for i, u in enumerate(d.directions):
         row = gradient(g, rows[u], d.directions) if rows[u] is not g.zero else {}
         entries += [
-            Entry(Slot(False, i), Slot(False, j), row[v], Array.ADDED)
+            OutputEntry(OutputSlot(False, i), OutputSlot(False, j), row[v], OutputArray.ADDED)
             for j, v in enumerate(d.directions)
             if row.get(v, g.zero) is not g.zero and not (d.conservative and j > i)
         ]
@@ -246,20 +250,20 @@ def _fixed(d: Definition, remainder: Node) -> list[Entry]:
 
 
 @dataclass(frozen=True)
-class Block:
+class ProductBlock:
     """Values at a point that depend on the same unknowns: rows of B with the same columns."""
 
     rows: tuple[int, ...]
     columns: tuple[int, ...]
 
 
-def blocks(entries: Sequence[Entry]) -> list[Block]:
+def blocks(entries: Sequence[OutputEntry]) -> list[ProductBlock]:
     """Rows of B, those of the same columns together."""
     columns: dict[int, list[int]] = {}
     for x in entries:
-        if x.array is Array.SLOPES and x.column is not None:
+        if x.array is OutputArray.SLOPES and x.column is not None:
             columns.setdefault(x.row.position, []).append(x.column.position)
     rows: dict[tuple[int, ...], list[int]] = {}
     for row, some in columns.items():
         rows.setdefault(tuple(some), []).append(row)
-    return [Block(tuple(k), some) for some, k in rows.items()]
+    return [ProductBlock(tuple(k), some) for some, k in rows.items()]

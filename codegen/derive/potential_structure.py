@@ -340,7 +340,7 @@ def _represent(
 
 
 @dataclass(frozen=True)
-class Structure:
+class PotentialStructure:
     """Potential `root` in terms of linear forms and squares, with its `constant` values.
 
     `interface` holds the modal coordinates and the point values, `forms` the linear forms of
@@ -356,7 +356,7 @@ class Structure:
     invariants: bool = False
 
 
-def linear_forms(d: Definition) -> Structure | None:
+def linear_forms(d: Definition) -> PotentialStructure | None:
     """Rewrite the potential through linear forms of the unknowns; None if that saves nothing."""
     if d.interpolated or d.prescribed:
         return None
@@ -371,10 +371,10 @@ def linear_forms(d: Definition) -> Structure | None:
     replacement = {z: _named(g, value, named) for z, value in interface.rewritten.items()}
     (root,), new = substitute(g, [root], replacement)
     constant = _left(new, (constants[c] for c in d.constant if c in constants))
-    return Structure(root, constant, interface, tuple(named.values()))
+    return PotentialStructure(root, constant, interface, tuple(named.values()))
 
 
-def quadratic_values(d: Definition, s: Structure) -> Structure:
+def quadratic_values(d: Definition, s: PotentialStructure) -> PotentialStructure:
     """The structure through named quadratic values of the forms: invariants where some suffice.
 
     In three dimensions no invariants are looked for in weak forms, where this takes ten times
@@ -403,7 +403,7 @@ def _left(new: Mapping[Node, Node], constant: Iterable[Node]) -> tuple[Node, ...
     return tuple(new[c] for c in constant if c in new)
 
 
-def structure_of(d: Definition) -> Structure | None:
+def structure_of(d: Definition) -> PotentialStructure | None:
     """Both, one after the other."""
     forms = linear_forms(d)
     return None if forms is None else quadratic_values(d, forms)

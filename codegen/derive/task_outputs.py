@@ -9,10 +9,10 @@ from itertools import product
 from softehl.codegen.abi import ADJOINT, AT_POINTS, Task, derivative_task
 from softehl.codegen.derive import invariant_chain_rule
 from softehl.codegen.derive.multilevel_chain_rule import Linearisation
-from softehl.codegen.derive.output_entries import Entry, Slot
-from softehl.codegen.derive.potential_structure import Structure, structure_of
+from softehl.codegen.derive.output_entries import OutputEntry, OutputSlot
+from softehl.codegen.derive.potential_structure import PotentialStructure, structure_of
 from softehl.codegen.graph.differentiation import directional, gradient
-from softehl.codegen.graph.graph import Input, Node
+from softehl.codegen.graph.graph import InputEntry, Node
 from softehl.codegen.graph.guarded_products import Certain, guarded, plus
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
@@ -44,7 +44,7 @@ class Variant:
     """The outputs of a task by one chain rule, which has a name."""
 
     rule: str
-    entries: list[Entry]
+    entries: list[OutputEntry]
 
 
 def _at_points(d: Definition) -> list[Node]:
@@ -52,7 +52,7 @@ def _at_points(d: Definition) -> list[Node]:
     return [*(n for _, n in d.fields), *d.term_updates]
 
 
-def outputs(d: Definition, task: str) -> list[Entry]:
+def outputs(d: Definition, task: str) -> list[OutputEntry]:
     """Output nodes of a task, before any pass: the first of its `variants`."""
     return next(variants(d, task, structure_of(d))).entries
 
@@ -62,18 +62,18 @@ def is_differentiated(task: str) -> bool:
     return task not in (Task.ENERGY, *AT_POINTS, *ADJOINT)
 
 
-def variants(d: Definition, task: str, structure: Structure | None) -> Iterator[Variant]:
+def variants(d: Definition, task: str, structure: PotentialStructure | None) -> Iterator[Variant]:
     """The outputs of a task by different chain rules: passes will tell which is the cheapest."""
     if task in ADJOINT:
         yield Variant("reverse, over forward, over reverse", _adjoint_rates(d, task))
     elif task == Task.FIELDS_RATE:
-        values = [Entry(Slot(False, k), None, n) for k, n in enumerate(_at_points(d))]
+        values = [OutputEntry(OutputSlot(False, k), None, n) for k, n in enumerate(_at_points(d))]
         yield Variant("along a variation", _rates(d, task, values))
     elif not is_differentiated(task):
         nodes = [d.potential] if task == Task.ENERGY else _at_points(d)
         yield Variant(
             "none, the page writes it down",
-            [Entry(Slot(False, k), None, n) for k, n in enumerate(nodes)],
+            [OutputEntry(OutputSlot(False, k), None, n) for k, n in enumerate(nodes)],
         )
     elif task in (Task.RESIDUAL, Task.TANGENT):
         yield from _rules(d, task, structure)
@@ -85,7 +85,7 @@ def variants(d: Definition, task: str, structure: Structure | None) -> Iterator[
         yield Variant(f"along one direction, {residual.rule}", _rates(d, task, residual.entries))
 
 
-def _rules(d: Definition, task: str, structure: Structure | None) -> Iterator[Variant]:
+def _rules(d: Definition, task: str, structure: PotentialStructure | None) -> Iterator[Variant]:
     if structure is not None:
         rules = {
             "level by level": invariant_chain_rule.by_levels(d, structure),
@@ -101,17 +101,17 @@ def _rules(d: Definition, task: str, structure: Structure | None) -> Iterator[Va
         yield Variant("through the values that the page names", _plain(d, task))
 
 
-def _plain(d: Definition, task: str) -> list[Entry]:
+def _plain(d: Definition, task: str) -> list[OutputEntry]:
     """Reverse mode, and forward over it through the interfaces that the model names."""
     adjoint = gradient(
         d.graph, d.potential, d.directions, constant=d.constant, prescribed=d.prescribed
     )
     slots = _slots(d)
-    rows = [Entry(s, None, adjoint[u]) for s, u in zip(slots, d.directions, strict=True)]
+    rows = [OutputEntry(s, None, adjoint[u]) for s, u in zip(slots, d.directions, strict=True)]
     return rows + (_tangent(d, rows, slots, adjoint) if task == Task.TANGENT else [])
 
 
-def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
+def _rates(d: Definition, task: str, rows: list[OutputEntry]) -> list[OutputEntry]:
     """The derivative of the residual `rows` along `direction` or with respect to one argument."""
     g = d.graph
     if task == Task.PRODUCT:
@@ -125,10 +125,10 @@ def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
         by_task = {derivative_task(name): node for name, node in d.derivatives}
         seeds = {by_task[task]: g.one}
     rates = directional(g, [x.node for x in rows], seeds, d.prescribed)
-    return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
+    return [OutputEntry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
 
 
-def _adjoint_rates(d: Definition, task: str) -> list[Entry]:
+def _adjoint_rates(d: Definition, task: str) -> list[OutputEntry]:
     """Rates of the derivatives of L = adjoint . residual + adjoints . history by all arguments.
 
     The rate of L along a variation is one value, whose derivatives are taken in reverse. The
@@ -157,12 +157,12 @@ def _adjoint_rates(d: Definition, task: str) -> list[Entry]:
         sources = [g.input("point data", k, varying=True) for k in range(count)]
     else:
         sources = [n for n in arguments if _array(n) != "point data"] + list(unknowns)
-    slopes = gradient(g, along, sources)
-    return [Entry(Slot(False, k), None, slopes[n]) for k, n in enumerate(sources)]
+    derivatives = gradient(g, along, sources)
+    return [OutputEntry(OutputSlot(False, k), None, derivatives[n]) for k, n in enumerate(sources)]
 
 
 def _array(n: Node) -> str:
-    assert isinstance(n.payload, Input)
+    assert isinstance(n.payload, InputEntry)
     return n.payload.array
 
 
@@ -171,7 +171,7 @@ def unknown_seeds(d: Definition, first: int) -> dict[Node, Node]:
     array = {"dofs": ("direction", first), "interpolated": ("interpolated direction", 0)}
     seeds = {}
     for u in d.directions:
-        assert isinstance(u.payload, Input)
+        assert isinstance(u.payload, InputEntry)
         name, offset = array[u.payload.array]
         seeds[u] = d.graph.input(name, offset + u.payload.index, varying=u.varying)
     return seeds
@@ -200,14 +200,16 @@ def argument_seeds(d: Definition) -> dict[Node, Node]:
     return seeds
 
 
-def _slots(d: Definition) -> list[Slot]:
+def _slots(d: Definition) -> list[OutputSlot]:
     direct = len(d.unknowns)
-    return [Slot(u.varying, k - direct if u.varying else k) for k, u in enumerate(d.directions)]
+    return [
+        OutputSlot(u.varying, k - direct if u.varying else k) for k, u in enumerate(d.directions)
+    ]
 
 
 def _tangent(
-    d: Definition, rows: list[Entry], slots: list[Slot], adjoint: dict[Node, Node]
-) -> list[Entry]:
+    d: Definition, rows: list[OutputEntry], slots: list[OutputSlot], adjoint: dict[Node, Node]
+) -> list[OutputEntry]:
     interface = [z for z in d.interface if z.varying]
     mirror = {adjoint[z]: z for z in interface if z in adjoint} if d.conservative else {}
     forward = Linearisation(
@@ -226,7 +228,7 @@ def _tangent(
             else:
                 entries[i, j] = forward.derivative(row.node, j)
     return [
-        Entry(slots[i], slots[j], n)
+        OutputEntry(slots[i], slots[j], n)
         for (i, j), n in entries.items()
         if not (slots[i].basis or slots[j].basis) or n is not d.graph.zero
     ]

@@ -238,7 +238,7 @@ def high_order_nodes(cell: ReferenceCell, groups: Groups, order: int) -> tuple[P
     for group in groups:
         corners = [cell.corners[k] for k in group]
         axes = [sorted({c[d] for c in corners}) for d in range(cell.dimension)]
-        lines = [inner if len(ends) > 1 else [sp.Integer(ends[0])] for ends in axes]
+        lines = [inner if len(signs) > 1 else [sp.Integer(signs[0])] for signs in axes]
         nodes += [tuple(reversed(node)) for node in product(*reversed(lines))]
     return tuple(nodes)
 

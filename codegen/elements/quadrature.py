@@ -141,8 +141,8 @@ def triangle(degree: int) -> QuadratureRule:
     if degree == 1:
         return QuadratureRule(2, ((third, third),), (sp.Rational(1, 2),))
     if degree == 2:
-        far = sp.Rational(2, 3)
-        return QuadratureRule(2, ((sixth, sixth), (far, sixth), (sixth, far)), (sixth,) * 3)
+        high = sp.Rational(2, 3)
+        return QuadratureRule(2, ((sixth, sixth), (high, sixth), (sixth, high)), (sixth,) * 3)
     return _collapsed(2, degree)
 
 
@@ -168,8 +168,8 @@ def tetrahedron(degree: int) -> QuadratureRule:
     if degree == 1:
         return QuadratureRule(3, ((sp.Rational(1, 4),) * 3,), (sp.Rational(1, 6),))
     if degree == 2:
-        near, far = (5 - sp.sqrt(5)) / 20, (5 + 3 * sp.sqrt(5)) / 20
-        points = ((near,) * 3, (far, near, near), (near, far, near), (near, near, far))
+        low, high = (5 - sp.sqrt(5)) / 20, (5 + 3 * sp.sqrt(5)) / 20
+        points = ((low,) * 3, (high, low, low), (low, high, low), (low, low, high))
         return QuadratureRule(3, points, (sp.Rational(1, 24),) * 4)
     return _collapsed(3, degree)
 
@@ -210,8 +210,8 @@ def _line(order: int) -> tuple[tuple[Any, Any], ...]:
     if order == 2:
         return tuple((s / sp.sqrt(3), sp.Integer(1)) for s in (-1, 1))
     if order == 3:
-        far, middle, side = sp.sqrt(sp.Rational(3, 5)), sp.Rational(8, 9), sp.Rational(5, 9)
-        return ((-far, side), (sp.Integer(0), middle), (far, side))
+        high, middle, side = sp.sqrt(sp.Rational(3, 5)), sp.Rational(8, 9), sp.Rational(5, 9)
+        return ((-high, side), (sp.Integer(0), middle), (high, side))
     return _jacobi(order, 0)
 
 
@@ -223,10 +223,10 @@ def _jacobi(order: int, power: int) -> tuple[tuple[Any, Any], ...]:
     slope = polynomial.diff(x)
     pairs = []
     for root in sorted(sp.nroots(polynomial, n=_DIGITS + 20, maxsteps=500)):
-        place = sp.Rational(str(root))
-        weight = 2 ** (power + 1) / ((1 - place**2) * slope.eval(place) ** 2)
-        pairs.append((place, _rounded(weight)))
-    return tuple((_rounded(place), weight) for place, weight in pairs)
+        abscissa = sp.Rational(str(root))
+        weight = 2 ** (power + 1) / ((1 - abscissa**2) * slope.eval(abscissa) ** 2)
+        pairs.append((abscissa, _rounded(weight)))
+    return tuple((_rounded(abscissa), weight) for abscissa, weight in pairs)
 
 
 def _rounded(value: Any) -> Any:
@@ -242,8 +242,8 @@ def _collapsed(dimension: int, degree: int) -> QuadratureRule:
     ]
     points, weights = [], []
     for entry in product(*factors):
-        place = [x for x, _ in entry]
-        shrunk = [x * sp.prod([1 - y for y in place[d + 1 :]]) for d, x in enumerate(place)]
+        point = [x for x, _ in entry]
+        shrunk = [x * sp.prod([1 - y for y in point[d + 1 :]]) for d, x in enumerate(point)]
         points.append(tuple(shrunk))
         weights.append(sp.prod([w for _, w in entry]))
     return QuadratureRule(dimension, tuple(points), tuple(weights))

@@ -17,8 +17,8 @@ from softehl.codegen.graph.run_time_arrays import (
     ArrayRoutine,
     Network,
     NetworkLayout,
-    Table,
     TableQuotient,
+    TableRoutine,
 )
 from softehl.codegen.language.definition import Definition
 
@@ -26,7 +26,7 @@ from softehl.codegen.language.definition import Definition
 def single(d: Definition, r: ArrayRoutine, signature: str) -> list[str]:
     """C functions of a routine for one element, callees first."""
     match r:
-        case Table():
+        case TableRoutine():
             return [_ROW, _POLYNOMIAL, f"{signature}{{\n{_opened(d, r, 's', '0.0')}{_TABLE}}}\n"]
         case TableQuotient():
             return [_ROW, _POLYNOMIAL, f"{signature}{{\n{_opened(d, r, 's', '0.0')}{_QUOTIENT}}}\n"]
@@ -45,7 +45,7 @@ def _opened(d: Definition, r: ArrayRoutine, results: str, zero: str) -> str:
     """The array a, and r, whose values are read: a itself or its rate. No rate is zero."""
     at = len(d.parameters) + ARRAY_ENTRIES * r.array
     lines = [f"const double *const a = parameters + (ptrdiff_t)parameters[{at}];"]
-    if isinstance(r, Table | TableQuotient):
+    if isinstance(r, TableRoutine | TableQuotient):
         lines.append(f"const ptrdiff_t m = ((ptrdiff_t)parameters[{at + 1}] - 4) / 5;")
     if r.rate:
         lines += [
@@ -55,7 +55,7 @@ def _opened(d: Definition, r: ArrayRoutine, results: str, zero: str) -> str:
             f"    return{' 0' if zero == '0.0' else ''};",
             "}",
         ]
-    elif isinstance(r, Table | TableQuotient):
+    elif isinstance(r, TableRoutine | TableQuotient):
         lines.append("const double *const r = a;")
     return "".join(f"    {line}\n" for line in lines)
 
@@ -342,10 +342,10 @@ class _Value(_Sweeps):
             yield "(void)d, (void)e;"
             yield from self.affine(self.last, "a", "s")
             return
-        yield from self._slopes()
+        yield from self._gradients()
         yield from self._second() if self.r.order == 2 else ["(void)e;"]
 
-    def _slopes(self) -> Iterator[str]:
+    def _gradients(self) -> Iterator[str]:
         """Slopes s by the inputs; e becomes what weighs J J^T."""
         n, last = self.n, self.last
         yield f"@T g[{self.widest}];"

@@ -13,7 +13,15 @@ from itertools import groupby
 
 from softehl.codegen import abi
 from softehl.codegen.emit.code_motion import If, Same, Schedule, Statement, flat
-from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, ResultIndex, Routine
+from softehl.codegen.graph.graph import (
+    BOOLEAN,
+    ELEMENTARY,
+    InputEntry,
+    Node,
+    Op,
+    ResultIndex,
+    Routine,
+)
 from softehl.codegen.language.definition import Definition
 
 WIDTH = 100
@@ -87,11 +95,11 @@ def single_use_values(
     a store in the block that computes them.
     """
     uses = Counter(outputs)
-    for stage in plan.stages:
-        _count(uses, stage.preamble)
-        if stage.loop is not None:
-            _count(uses, stage.loop.body)
-            uses.update(s.args[0] for s in stage.loop.sums)
+    for group in plan.stages:
+        _count(uses, group.preamble)
+        if group.loop is not None:
+            _count(uses, group.loop.body)
+            uses.update(s.args[0] for s in group.loop.sums)
     inlinable = set(stored)
     for block, sums in _blocks(plan):
         nodes = {s for s in block if isinstance(s, Node)}
@@ -108,11 +116,11 @@ def _count(uses: Counter[Node], block: Iterable[Statement]) -> None:
 
 def _blocks(plan: Schedule) -> Iterator[tuple[list[Statement], tuple[Node, ...]]]:
     """Every block of statements, with the sums that a loop adds up from it."""
-    for stage in plan.stages:
-        yield from ((b, ()) for b in _nested(stage.preamble))
-        if stage.loop is not None:
-            yield stage.loop.body, stage.loop.sums
-            yield from ((b, ()) for s in stage.loop.body if isinstance(s, If) for b in _sides(s))
+    for group in plan.stages:
+        yield from ((b, ()) for b in _nested(group.preamble))
+        if group.loop is not None:
+            yield group.loop.body, group.loop.sums
+            yield from ((b, ()) for s in group.loop.body if isinstance(s, If) for b in _sides(s))
 
 
 def _nested(block: list[Statement]) -> Iterator[list[Statement]]:
@@ -214,7 +222,7 @@ class Printer:
     def ref(self, n: Node) -> str:
         if n.op is Op.CONST:
             return number(float(n.value))
-        if isinstance(n.payload, Input):
+        if isinstance(n.payload, InputEntry):
             return _ARRAYS[n.payload.array].format(n.payload.index)
         return f"({self.inside[n]})" if n in self.inside else self.names[n]
 

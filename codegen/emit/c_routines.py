@@ -24,11 +24,11 @@ from softehl.codegen.graph.routines import (
     External,
     Inverse,
     Isotropic,
-    Newton,
+    NewtonRoutine,
     derivatives_of_energy,
 )
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine
-from softehl.codegen.graph.tensor_functions import Kernel
+from softehl.codegen.graph.tensor_functions import MatrixKernel
 from softehl.codegen.graph.term_reductions import Reduction
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
@@ -163,7 +163,7 @@ def texts(
 
 def _text(d: Definition, r: Routine) -> list[str]:
     match r:
-        case Newton():
+        case NewtonRoutine():
             return _newton(d, r)
         case Inverse():
             return [_ELIMINATE, _inverse(d, r)]
@@ -185,7 +185,7 @@ def _text(d: Definition, r: Routine) -> list[str]:
             return [tensor_routines.second_quotient(r, _signature(d, r), arrays_unused(d))]
         case Bessel():
             return bessel_routine.text(r, _signature(d, r), arrays_unused(d))
-        case Kernel():
+        case MatrixKernel():
             return tensor_routines.text(r, _signature(d, r), arrays_unused(d))
     raise TypeError(f"no C for {r}")
 
@@ -215,14 +215,14 @@ class Body:
         p = self.printer
         plan = schedule(self.roots)
         p.read(plan, self.roots)
-        for stage in plan.stages:
-            p.block(depth, stage.preamble)
+        for group in plan.stages:
+            p.block(depth, group.preamble)
         for target, n in zip(targets, self.roots, strict=True):
             p.line(depth, f"{target} = {p.value(n)};")
         return p.text()
 
 
-def newton_values(r: Newton) -> tuple[list[Node], list[str]]:
+def newton_values(r: NewtonRoutine) -> tuple[list[Node], list[str]]:
     """Values of every step of a local iteration, and the variables that take them."""
     n, first = r.outputs, r.inputs - r.outputs
     derivatives = [a for rows in (r.by_local, r.by_external) for row in rows for a in row]
@@ -230,12 +230,12 @@ def newton_values(r: Newton) -> tuple[list[Node], list[str]]:
     return [*r.equations, *derivatives], targets + [f"B[{i}]" for i in range(n * first)]
 
 
-def rounding(r: Newton) -> str:
+def rounding(r: NewtonRoutine) -> str:
     """Bound of the rounding of an equation, relative to the sum of its terms."""
     return number(r.inputs * sys.float_info.epsilon)
 
 
-def _newton(d: Definition, r: Newton) -> list[str]:
+def _newton(d: Definition, r: NewtonRoutine) -> list[str]:
     n, first = r.outputs, r.inputs - r.outputs
     values, targets = newton_values(r)
     body = Body(d, d.graph, values, Printer(d))

@@ -55,7 +55,7 @@ class Loop:
 
 
 @dataclass(frozen=True)
-class Stage:
+class PlanStage:
     """Values that do not vary with the point, then a loop (or none)."""
 
     preamble: list[Statement]
@@ -66,7 +66,7 @@ class Stage:
 class Schedule:
     """All stages of a kernel, in order, and how much work is in and out of the loops."""
 
-    stages: tuple[Stage, ...]
+    stages: tuple[PlanStage, ...]
     operations_once: int
     operations_per_point: int
 
@@ -93,13 +93,13 @@ def schedule(roots: Sequence[Node]) -> Schedule:
                 place_in_branches(depth_first(inside, loop_roots), set(loop_roots)), feeds, outputs
             )
             looped += sum(n.op is not Op.ITEM for n in inside) + len(feeds)
-        stages.append(Stage(preamble, loop))
+        stages.append(PlanStage(preamble, loop))
     return Schedule(tuple(stages), once, looped)
 
 
 def straight_line(order: Sequence[Node]) -> Schedule:
     """A kernel without loops and branches, in the given order."""
-    return Schedule((Stage(list(order), None),), len(order), 0)
+    return Schedule((PlanStage(list(order), None),), len(order), 0)
 
 
 def is_straight(plan: Schedule) -> bool:

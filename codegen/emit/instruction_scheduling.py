@@ -201,7 +201,7 @@ class _Scheduler:
         """
         registers, uses, arrivals, clock = self.registers, self._uses, self._arrival, self.clock
         best: _Piece | None = None
-        least = 0.0
+        lowest = 0.0
         for p in self.ready:
             cost, arrival = self._drift[p], clock
             for a in p.fetched:
@@ -222,8 +222,8 @@ class _Scheduler:
                     arrival = max(arrival, arrivals.get(total, 0))
             if arrival > clock:
                 cost += WAITING * min(arrival - clock, LONGEST_WAIT)
-            if best is None or cost < least or (cost == least and p.node.id < best.node.id):
-                best, least = p, cost
+            if best is None or cost < lowest or (cost == lowest and p.node.id < best.node.id):
+                best, lowest = p, cost
         assert best is not None
         return best
 
@@ -276,20 +276,20 @@ def order_plan(g: Graph, plan: Schedule, roots: Sequence[Node]) -> Schedule:
     """The plan with every run of every block arranged."""
     work = _Runs(g, plan, roots)
     stages, computed = [], set[Node]()
-    for stage in plan.stages:
-        preamble = work.block(stage.preamble, computed)
-        loop = stage.loop
+    for block in plan.stages:
+        preamble = work.block(block.preamble, computed)
+        loop = block.loop
         if loop is not None:
             loop = replace(loop, body=work.block(loop.body, set(computed)))
             computed.update(loop.sums)
-        stages.append(replace(stage, preamble=preamble, loop=loop))
+        stages.append(replace(block, preamble=preamble, loop=loop))
     live = set(roots)
-    for k, stage in reversed(list(enumerate(stages))):
-        loop = stage.loop
+    for k, block in reversed(list(enumerate(stages))):
+        loop = block.loop
         if loop is not None:
             live.update(loop.outputs, (s.args[0] for s in loop.sums))
             loop = replace(loop, body=_used(loop.body, live))
-        stages[k] = replace(stage, preamble=_used(stage.preamble, live), loop=loop)
+        stages[k] = replace(block, preamble=_used(block.preamble, live), loop=loop)
     return replace(plan, stages=tuple(stages))
 
 

@@ -19,10 +19,10 @@ def peak_live(plan: Schedule) -> int:
     """Largest number of temporaries that are live at the same time."""
     walk = _Backwards()
     live: frozenset[Node] = frozenset()
-    for stage in reversed(plan.stages):
-        if stage.loop is not None:
-            live = walk.loop(stage.loop, live)
-        live = walk.block(stage.preamble, live)
+    for group in reversed(plan.stages):
+        if group.loop is not None:
+            live = walk.loop(group.loop, live)
+        live = walk.block(group.preamble, live)
     return walk.peak
 
 

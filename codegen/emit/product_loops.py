@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from softehl.codegen.derive.output_entries import Array, Entry
-from softehl.codegen.derive.point_products import Block, blocks
+from softehl.codegen.derive.output_entries import OutputArray, OutputEntry
+from softehl.codegen.derive.point_products import ProductBlock, blocks
 from softehl.codegen.emit.c_printer import Printer
 from softehl.codegen.graph.graph import FREE, Node
 
@@ -17,7 +17,7 @@ LARGE = 65536
 """Entries of a tangent from which it is no longer on the stack."""
 
 
-def operations(entries: Sequence[Entry], unknowns: int, *, symmetric: bool) -> int:
+def operations(entries: Sequence[OutputEntry], unknowns: int, *, symmetric: bool) -> int:
     """Multiplications and additions of all products at one point."""
     groups = blocks(entries)
     total = 0
@@ -32,14 +32,14 @@ def operations(entries: Sequence[Entry], unknowns: int, *, symmetric: bool) -> i
 class ProductLoops:
     """Arrays and loops of the products of one tangent."""
 
-    def __init__(self, p: Printer, entries: Sequence[Entry]) -> None:
+    def __init__(self, p: Printer, entries: Sequence[OutputEntry]) -> None:
         self.p, self.size = p, len(p.d.unknowns)
-        self.entries = [x for x in entries if x.array is not Array.OUTPUT]
+        self.entries = [x for x in entries if x.array is not OutputArray.OUTPUT]
         self.symmetric = p.d.conservative
         self.blocks = blocks(self.entries)
         self.rank = {row: (n, k) for n, b in enumerate(self.blocks) for k, row in enumerate(b.rows)}
-        self.place = [{j: k for k, j in enumerate(b.columns)} for b in self.blocks]
-        self.pending: dict[Node, list[Entry]] = {}
+        self.lanes = [{j: k for k, j in enumerate(b.columns)} for b in self.blocks]
+        self.pending: dict[Node, list[OutputEntry]] = {}
         for x in self.entries:
             self.pending.setdefault(x.node, []).append(x)
 
@@ -68,8 +68,8 @@ class ProductLoops:
         fixed = [n for n in self.pending if not n.varying]
         for n in fixed:
             some = self.pending[n]
-            self._print(2, [x for x in some if x.array is not Array.ADDED])
-            self.pending[n] = [x for x in some if x.array is Array.ADDED]
+            self._print(2, [x for x in some if x.array is not OutputArray.ADDED])
+            self.pending[n] = [x for x in some if x.array is OutputArray.ADDED]
 
     def computed(self, nodes: Iterable[Node]) -> None:
         """Print what becomes of values at the point."""
@@ -77,24 +77,24 @@ class ProductLoops:
             if n.varying:
                 self._print(2, self.pending.pop(n, []))
 
-    def _print(self, depth: int, entries: Iterable[Entry]) -> None:
+    def _print(self, depth: int, entries: Iterable[OutputEntry]) -> None:
         for x in entries:
             value = self.p.value(x.node)
             self.p.line(
                 depth,
                 f"{self._target(x)} = {value};"
-                if x.array is not Array.ADDED
+                if x.array is not OutputArray.ADDED
                 else f"{self._target(x)} += {value};",
             )
 
-    def _target(self, x: Entry) -> str:
+    def _target(self, x: OutputEntry) -> str:
         assert x.column is not None
         i, j = x.row.position, x.column.position
-        if x.array is Array.ADDED:
+        if x.array is OutputArray.ADDED:
             return f"k_lanes[{self.size * i + j}]"
         n, k = self.rank.get(i, (0, 0))
-        if x.array is Array.SLOPES:
-            return f"B{n}_lanes[{k}][{self.place[n][j]}]"
+        if x.array is OutputArray.SLOPES:
+            return f"B{n}_lanes[{k}][{self.lanes[n][j]}]"
         row, column = self._row(i), self._row(j)
         if self.symmetric and column > row:
             row, column = column, row
@@ -115,12 +115,12 @@ class ProductLoops:
         for a, b, m, n in self._pairs():
             self._product(a, b, m, n)
 
-    def _pairs(self) -> Iterator[tuple[Block, Block, int, int]]:
+    def _pairs(self) -> Iterator[tuple[ProductBlock, ProductBlock, int, int]]:
         for m, a in enumerate(self.blocks):
             for n, b in enumerate(self.blocks):
                 yield a, b, m, n
 
-    def _product(self, a: Block, b: Block, m: int, n: int) -> None:
+    def _product(self, a: ProductBlock, b: ProductBlock, m: int, n: int) -> None:
         p, rows, columns = self.p, len(a.rows), len(b.columns)
         first, second = self._row(a.rows[0]), self._row(b.rows[0])
         p.line(2, "{")

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from softehl.codegen import abi
-from softehl.codegen.derive.output_entries import Array, Entry, Slot
+from softehl.codegen.derive.output_entries import OutputArray, OutputEntry, OutputSlot
 from softehl.codegen.emit.batch_functions import functions, widths
 from softehl.codegen.emit.c_printer import (
     Printer,
@@ -26,7 +26,7 @@ from softehl.codegen.emit.code_motion import If, Loop, Same, Schedule, Statement
 from softehl.codegen.emit.instruction_scheduling import ADDITIONS
 from softehl.codegen.emit.product_loops import ProductLoops
 from softehl.codegen.emit.simd_printer import LanePrinter
-from softehl.codegen.graph.graph import FREE, Input, Node, Op
+from softehl.codegen.graph.graph import FREE, InputEntry, Node, Op
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
 
@@ -57,7 +57,7 @@ def _letters(d: Definition) -> list[str]:
     return [f"{letter}{k or ''}" for k in range(d.components // 2) for letter in "ND"]
 
 
-def scatter(p: Printer, depth: int, task: str, entries: Sequence[Entry]) -> None:
+def scatter(p: Printer, depth: int, task: str, entries: Sequence[OutputEntry]) -> None:
     """Outputs of the point spread over the shape functions."""
     direct = len(p.d.unknowns)
     at = {(x.row, x.column): p.value(x.node) for x in entries}
@@ -71,7 +71,7 @@ def scatter(p: Printer, depth: int, task: str, entries: Sequence[Entry]) -> None
         if left:
             p.line(depth + 1, f"{p.output.format(target[0])}{target[1:]} += {left};")
     size = range(p.d.components)
-    blocks = [[at.get((Slot(True, r), Slot(True, c))) for r in size] for c in size]
+    blocks = [[at.get((OutputSlot(True, r), OutputSlot(True, c))) for r in size] for c in size]
     if any(value is not None for pair in blocks for value in pair):
         for c, pair in enumerate(blocks):
             right = _combination(letters, pair) or p.zero
@@ -83,18 +83,22 @@ def scatter(p: Printer, depth: int, task: str, entries: Sequence[Entry]) -> None
     p.line(depth, "}")
 
 
-Key = tuple[Slot, Slot | None]
+Key = tuple[OutputSlot, OutputSlot | None]
 
 
 def _scatter_targets(d: Definition, task: str) -> list[tuple[list[Key], str]]:
     """Pairs (components of an output, its index for basis function i)."""
     direct, dofs = len(d.unknowns), dofs_expression(d)
-    both = [Slot(True, k) for k in range(d.components)]
+    both = [OutputSlot(True, k) for k in range(d.components)]
     out: list[tuple[list[Key], str]] = [([(s, None) for s in both], f"R[{direct} + i]")]
     if task == abi.Task.TANGENT:
         for k in range(direct):
-            out.append(([(s, Slot(False, k)) for s in both], f"K[({direct} + i) * {dofs} + {k}]"))
-            out.append(([(Slot(False, k), s) for s in both], f"K[{k} * {dofs} + {direct} + i]"))
+            out.append(
+                ([(s, OutputSlot(False, k)) for s in both], f"K[({direct} + i) * {dofs} + {k}]")
+            )
+            out.append(
+                ([(OutputSlot(False, k), s) for s in both], f"K[{k} * {dofs} + {direct} + i]")
+            )
     return out
 
 
@@ -106,32 +110,32 @@ _READ = {"coordinates": "X", "dofs": "d", "data": "a", "direction": "t"}
 
 
 def function(
-    definition: Definition, task: str, entries: Sequence[Entry], plan: Schedule
+    definition: Definition, task: str, entries: Sequence[OutputEntry], plan: Schedule
 ) -> tuple[str, int]:
     """C text of one kernel (group function and batch loop) and the number of its temporaries."""
     p = LanePrinter(definition)
-    _Group(p, task, entries).write(plan)
+    _LaneGroup(p, task, entries).write(plan)
     return functions(definition, task, p.text()), p.temporaries
 
 
-def along_basis(x: Entry) -> bool:
+def along_basis(x: OutputEntry) -> bool:
     """True if an output is spread over the shape functions of an interpolated field."""
     return x.row.basis or (x.column is not None and x.column.basis)
 
 
-class _Group:
+class _LaneGroup:
     """The body of a group function."""
 
-    def __init__(self, p: LanePrinter, task: str, entries: Sequence[Entry]) -> None:
+    def __init__(self, p: LanePrinter, task: str, entries: Sequence[OutputEntry]) -> None:
         self.p, self.task, self.entries = p, task, entries
         self.widths = widths(p.d, task)
         self.scattered = any(map(along_basis, entries))
-        by_products = any(x.array is not Array.OUTPUT for x in entries)
+        by_products = any(x.array is not OutputArray.OUTPUT for x in entries)
         self.products = ProductLoops(p, entries) if by_products else None
         self.stores = _Stores(p, self._targets())
         needed = reachable([x.node for x in entries])
         self.fallible = any(n.op is Op.CALL for n in needed)
-        self.inputs = {p.ref(n) for n in needed if isinstance(n.payload, Input)}
+        self.inputs = {p.ref(n) for n in needed if isinstance(n.payload, InputEntry)}
 
     def write(self, plan: Schedule) -> None:
         p = self.p
@@ -147,13 +151,13 @@ class _Group:
         if self.products:
             self.products.declare()
         self.stores.start()
-        for stage in plan.stages:
-            for s in stage.preamble:
+        for group in plan.stages:
+            for s in group.preamble:
                 p.block(1, [s])
                 self.stores.mark_computed(_values(s))
-            if stage.loop is not None:
-                self._loop(stage.loop)
-                self.stores.mark_computed(stage.loop.sums)
+            if group.loop is not None:
+                self._loop(group.loop)
+                self.stores.mark_computed(group.loop.sums)
         self._finish()
 
     def _loads(self) -> None:
@@ -186,7 +190,7 @@ class _Group:
     def _data(self) -> int:
         """Data to load before any loop: with those of the points where the loop is written out."""
         inputs = [n.payload for n in reachable(x.node for x in self.entries)]
-        used = [i.index + 1 for i in inputs if isinstance(i, Input) and i.array == "data"]
+        used = [i.index + 1 for i in inputs if isinstance(i, InputEntry) and i.array == "data"]
         return max([len(self.p.d.data), *used])
 
     def _array(self, kind: str, letter: str, size: str) -> None:
@@ -225,7 +229,7 @@ class _Group:
             return []
         flat: dict[str, dict[int, Node]] = {"R": {}, "K": {}}
         for x in self.entries:
-            if x.array is not Array.OUTPUT:
+            if x.array is not OutputArray.OUTPUT:
                 continue
             if x.column is None:
                 flat["R"][x.row.position] = x.node
@@ -313,9 +317,9 @@ class _Group:
         for s in sums:
             self.p.line(2, f"{self.p.ref(s)} += {self.p.bare(s.args[0])};")
 
-    def _fields(self, entries: Sequence[Entry]) -> None:
+    def _fields(self, entries: Sequence[OutputEntry]) -> None:
         """Values at the point `q`: neighbours together."""
-        runs: list[list[Entry]] = []
+        runs: list[list[OutputEntry]] = []
         width = point_width(self.p.d, self.task)
         entries = [x for x in entries if x.row.position < width]  # terms are there
         for x in sorted(entries, key=lambda x: x.row.position):

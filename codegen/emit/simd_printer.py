@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from softehl.codegen import abi
 from softehl.codegen.emit.c_printer import Printer, array_operands, number
 from softehl.codegen.emit.code_motion import If, Same, Statement
-from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, FREE, Input, Node, Op, Routine
+from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, FREE, InputEntry, Node, Op, Routine
 from softehl.codegen.graph.term_reductions import Kind, Reduction
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
@@ -65,14 +65,14 @@ class LanePrinter(Printer):
         """True when all lanes hold the same value."""
         if n not in self.scalar:
             for m in reachable([n], stop=self.scalar.__contains__):
-                if isinstance(m.payload, Input):
+                if isinstance(m.payload, InputEntry):
                     self.scalar[m] = m.payload.array in _SAME
                 elif m not in self.scalar:
                     self.scalar[m] = m.op is not Op.CALL and all(self.scalar[a] for a in m.args)
         return self.scalar[n]
 
     def ref(self, n: Node) -> str:
-        if isinstance(n.payload, Input) and n.payload.array in _LETTERS:
+        if isinstance(n.payload, InputEntry) and n.payload.array in _LETTERS:
             return _LETTERS[n.payload.array] + str(n.payload.index)
         return super().ref(n)
 

@@ -14,9 +14,9 @@ from softehl.codegen.emit.simd_printer import LanePrinter
 from softehl.codegen.graph.bessel import Bessel
 from softehl.codegen.graph.divided_difference import Quotient, SecondQuotient
 from softehl.codegen.graph.graph import Routine
-from softehl.codegen.graph.routines import External, Inverse, Isotropic, Newton
+from softehl.codegen.graph.routines import External, Inverse, Isotropic, NewtonRoutine
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine, Network
-from softehl.codegen.graph.tensor_functions import Kernel
+from softehl.codegen.graph.tensor_functions import MatrixKernel
 from softehl.codegen.graph.term_reductions import Reduction
 from softehl.codegen.language.definition import Definition
 
@@ -28,14 +28,14 @@ def texts(d: Definition, routines: Iterable[Routine]) -> list[str]:
 
 def _text(d: Definition, r: Routine) -> list[str]:
     match r:
-        case Newton():
+        case NewtonRoutine():
             return _newton(d, r)
         case Inverse():
             return [_inverse(d, r)]
-        case Kernel() if tensor_routines.in_lanes(r):
+        case MatrixKernel() if tensor_routines.in_lanes(r):
             unused = c_routines.arrays_unused(d)
             return tensor_routines.text(r, _signature(d, r), unused, tensor_routines.LANES)
-        case Isotropic() | External() | Quotient() | SecondQuotient() | Kernel() | Bessel():
+        case Isotropic() | External() | Quotient() | SecondQuotient() | MatrixKernel() | Bessel():
             return [*c_routines.texts(d, [r]), _one_by_one(d, r)]
         case Reduction():
             values, targets = term_loops.bodies(r)
@@ -55,7 +55,7 @@ def _signature(d: Definition, r: Routine) -> str:
     return f"static void {name}(\n    {arguments})\n"
 
 
-def _newton(d: Definition, r: Newton) -> list[str]:
+def _newton(d: Definition, r: NewtonRoutine) -> list[str]:
     """Lanes that are done keep their solution while others go on."""
     n, first = r.outputs, r.inputs - r.outputs
     values, targets = c_routines.newton_values(r)
@@ -117,16 +117,16 @@ def _inverse(d: Definition, r: Inverse) -> str:
 
 def _one_by_one(d: Definition, r: Routine) -> str:
     """A routine of one element called for each lane that wants it."""
-    arrays, place = array_operands(d, "&at"), ""
+    arrays, terms = array_operands(d, "&at"), ""
     if d.term_history:
-        place = """        const softehl_terms at = {
+        terms = """        const softehl_terms at = {
             terms->read ? terms->read + l * terms->read_step : 0, 0,
             terms->write ? terms->write + l * terms->write_step : 0, 0};
         (void)at;
 """
     return f"""{_signature(d, r)}{{
     for (int l = 0; l < SOFTEHL_LANES; ++l) {{
-{place}        double one[{max(r.inputs, 1)}], out[{r.outputs}];
+{terms}        double one[{max(r.inputs, 1)}], out[{r.outputs}];
         for (int k = 0; k < {r.inputs}; ++k) one[k] = softehl_lane(p[k], l);
         for (int k = 0; k < {r.outputs}; ++k) out[k] = NAN;
         if (softehl_lane(active, l) && softehl_{d.name}_{r.name}({arrays}one, out))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from softehl.codegen.graph.divided_difference import SecondQuotient
 from softehl.codegen.graph.graph import Op
-from softehl.codegen.graph.tensor_functions import Kernel, Kind, entry_pairs
+from softehl.codegen.graph.tensor_functions import KernelKind, MatrixKernel, entry_pairs
 
 
 @dataclass(frozen=True)
@@ -33,42 +33,44 @@ LANES = Numbers(
 )
 
 
-def in_lanes(r: Kernel) -> bool:
+def in_lanes(r: MatrixKernel) -> bool:
     """True for routines that are printed for vectors of lanes as well."""
-    return r.kind in (Kind.SUM, Kind.SLOPE, Kind.CURVATURE, Kind.BENDING)
+    return r.kind in (KernelKind.SUM, KernelKind.SLOPE, KernelKind.CURVATURE, KernelKind.BENDING)
 
 
-def text(r: Kernel, signature: str, unused: str, numbers: Numbers = SCALAR) -> list[str]:
+def text(r: MatrixKernel, signature: str, unused: str, numbers: Numbers = SCALAR) -> list[str]:
     """The C function of a routine and its callees, callees first."""
     match r.kind:
-        case Kind.EIGEN:
+        case KernelKind.EIGEN:
             return [_FORM, _JACOBI, _eigen(r, signature, unused)]
-        case Kind.EXP | Kind.EXP_SLOPE | Kind.EXP_CURVATURE:
+        case KernelKind.EXP | KernelKind.EXP_SLOPE | KernelKind.EXP_CURVATURE:
             return [_PRODUCT, _MOVE, _SCALING, _exponential(r, signature, unused)]
     n, entries = r.size, r.size * (r.size + 1) // 2
     pairs = entry_pairs(n)
     rows, columns = (", ".join(str(p[k]) for p in pairs) for k in (0, 1))
     failed = "int lost = 0;" if numbers is SCALAR else "M spoilt = softehl_mask(0);"
     body = _BODIES[r.kind]
-    if r.kind is Kind.CURVATURE and n == 3:
+    if r.kind is KernelKind.CURVATURE and n == 3:
         body = body.replace("{triple}", _TRIPLE)
-    words = {
+    values_of = {
         "{triple}": "",
         "{n}": str(n),
         "{N}": str(entries),
         "{T}": numbers.kind,
         "{zero}": numbers.zero,
-        "{first}": str({Kind.SLOPE: entries, Kind.SUM: n}.get(r.kind, n * n if n == 2 else 10)),
+        "{first}": str(
+            {KernelKind.SLOPE: entries, KernelKind.SUM: n}.get(r.kind, n * n if n == 2 else 10)
+        ),
         "{gap}": _GAP[numbers is SCALAR],
     }
-    for word, value in words.items():
-        body = body.replace(word, value)
-    checked = r.inputs if r.kind is Kind.BENDING else r.inputs - n * n
-    if r.kind is Kind.CURVATURE:
+    for mark, value in values_of.items():
+        body = body.replace(mark, value)
+    checked = r.inputs if r.kind is KernelKind.BENDING else r.inputs - n * n
+    if r.kind is KernelKind.CURVATURE:
         checked = r.inputs - n * n - entries
-    products = "" if r.kind is Kind.SUM else _PRODUCTS
-    for word, value in words.items():
-        products = products.replace(word, value)
+    products = "" if r.kind is KernelKind.SUM else _PRODUCTS
+    for mark, value in values_of.items():
+        products = products.replace(mark, value)
     return [
         f"""{signature}{{
 {unused}    static const int row[{entries}] = {{{rows}}}, column[{entries}] = {{{columns}}};
@@ -90,14 +92,14 @@ _PRODUCTS = """    {T} v[{N}][{N}];
 """
 
 _BODIES = {
-    Kind.SUM: """    const {T} *Q = p + {first};
+    KernelKind.SUM: """    const {T} *Q = p + {first};
     for (int i = 0; i < {N}; ++i) {
         s[i] = {zero};
         for (int a = 0; a < {n}; ++a)
             s[i] += p[a] * Q[{n} * row[i] + a] * Q[{n} * column[i] + a];
     }
 """,
-    Kind.SLOPE: """    const {T} *Q = p + {first};
+    KernelKind.SLOPE: """    const {T} *Q = p + {first};
 {products}    {T} h[{N}];
     for (int n = 0, i = 0; i < {N}; ++i) {
         for (int m = 0; m < {N}; ++m) h[m] = (m < {n} ? 1.0 : 0.5) * p[m] * v[m][i];
@@ -107,7 +109,7 @@ _BODIES = {
         }
     }
 """,
-    Kind.CURVATURE: """    const {T} *Q = p + {first}, *along = Q + {n} * {n};
+    KernelKind.CURVATURE: """    const {T} *Q = p + {first}, *along = Q + {n} * {n};
 {products}    {T} P[{N}], K[{N}][{N}], h[{N}];
     for (int m = 0; m < {N}; ++m) {
         P[m] = {zero};
@@ -135,7 +137,7 @@ _BODIES = {
         }
     }
 """,
-    Kind.BENDING: """    const {T} *Q = p + {n}, *along = Q + {n} * {n};
+    KernelKind.BENDING: """    const {T} *Q = p + {n}, *along = Q + {n} * {n};
 {products}    {T} h[{N}];
     for (int m = {n}; m < {N}; ++m) {
         const {T} x = p[row[m]], y = p[column[m]];
@@ -168,7 +170,7 @@ _ABOUT_EIGENVALUES = """/* Eigenvalues, the largest first, and vectors (columns)
 """
 
 
-def _eigen(r: Kernel, signature: str, unused: str) -> str:
+def _eigen(r: MatrixKernel, signature: str, unused: str) -> str:
     n = r.size
     pairs = entry_pairs(n)
     filled = ", ".join(
@@ -308,14 +310,14 @@ static int softehl_scaling(int n, const double *A, int *terms)
 """
 
 
-def _exponential(r: Kernel, signature: str, unused: str) -> str:
+def _exponential(r: MatrixKernel, signature: str, unused: str) -> str:
     """Horner's scheme of the series and the squarings, both differentiated line by line.
 
     The directions of A are its entries; with X = exp(A) come X_k, and in the curvature X_P and X_kP
     of the transposed matrix along P: the sum of p_i Y_i has the slope exp'(A^T) P.
     """
     n, m = r.size, r.size * r.size
-    slope, curved = r.kind is not Kind.EXP, r.kind is Kind.EXP_CURVATURE
+    slope, curved = r.kind is not KernelKind.EXP, r.kind is KernelKind.EXP_CURVATURE
     source = f"p[{n} * (k % {n}) + k / {n}]" if curved else "p[k]"
     arrays = [f"X[{m}] = {{0.0}}"]
     if slope:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from softehl.codegen.emit.c_printer import length_place, terms_expression
-from softehl.codegen.graph.graph import Input, Node
+from softehl.codegen.graph.graph import InputEntry, Node
 from softehl.codegen.graph.term_reductions import Entry, Kind, Reduction, splits
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
@@ -89,7 +89,7 @@ def _locals(r: Reduction, *, lanes: bool) -> tuple[str, str]:
     used = {
         n.payload.index
         for n in reachable(bodies(r)[0])
-        if isinstance(n.payload, Input) and n.payload.array == "local"
+        if isinstance(n.payload, InputEntry) and n.payload.array == "local"
     }
     for k in range(2 * count):
         letter, number = "ar"[k // count], k % count

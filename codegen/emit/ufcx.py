@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from softehl.codegen import abi
-from softehl.codegen.derive.output_entries import Entry
+from softehl.codegen.derive.output_entries import OutputEntry
 from softehl.codegen.emit.c_printer import Printer, number
 from softehl.codegen.emit.c_routines import called
 from softehl.codegen.emit.c_runtime import ROOTS
 from softehl.codegen.emit.code_motion import Loop, Schedule
-from softehl.codegen.graph.graph import Input, Node
+from softehl.codegen.graph.graph import InputEntry, Node
 from softehl.codegen.language.definition import Definition
 
 _NOT_OFFERED = (abi.Task.PRODUCT, abi.Task.PSEUDO_LOAD, abi.Task.FIELDS_RATE)
@@ -37,7 +37,7 @@ def tasks(d: Definition, offered: Iterable[str]) -> list[str]:
     return [t for t in offered if t not in _NOT_OFFERED]
 
 
-def task_entries(entries: Sequence[Entry], task: str) -> list[Entry]:
+def task_entries(entries: Sequence[OutputEntry], task: str) -> list[OutputEntry]:
     """Outputs of one form: the matrix alone for the tangent."""
     return [x for x in entries if task != abi.Task.TANGENT or x.column is not None]
 
@@ -65,9 +65,9 @@ class _CellPrinter(Printer):
         self.vertices, self.positions = vertices(definition), vertex_positions(definition)
 
     def ref(self, n: Node) -> str:
-        return self.argument(n.payload) if isinstance(n.payload, Input) else super().ref(n)
+        return self.argument(n.payload) if isinstance(n.payload, InputEntry) else super().ref(n)
 
-    def argument(self, source: Input) -> str:
+    def argument(self, source: InputEntry) -> str:
         k = source.index
         match source.array:
             case "coordinates":
@@ -88,13 +88,13 @@ class _CellPrinter(Printer):
 
 
 def function(
-    definition: Definition, task: str, entries: Sequence[Entry], plan: Schedule
+    definition: Definition, task: str, entries: Sequence[OutputEntry], plan: Schedule
 ) -> tuple[str, int]:
     """C text of one cell kernel and the number of its temporaries."""
     p = _CellPrinter(definition)
     p.line(1, "(void)w, (void)c, (void)coordinate_dofs;")
     p.line(1, "(void)entity_local_index, (void)quadrature_permutation, (void)custom_data;")
-    if any(stage.loop is not None for stage in plan.stages):
+    if any(group.loop is not None for group in plan.stages):
         _table(p)
     if definition.arrays:
         p.line(1, "const double *const parameters = c;")
@@ -104,10 +104,10 @@ def function(
         p.line(1, "int failed = 0;")
     values = {} if task == abi.Task.FIELDS else {_target(p, task, x): x.node for x in entries}
     p.read(plan, [x.node for x in entries])
-    for stage in plan.stages:
-        p.block(1, stage.preamble)
-        if stage.loop is not None:
-            _loop(p, stage.loop, entries if task == abi.Task.FIELDS else [])
+    for group in plan.stages:
+        p.block(1, group.preamble)
+        if group.loop is not None:
+            _loop(p, group.loop, entries if task == abi.Task.FIELDS else [])
     if task == abi.Task.FIELDS:
         _same_at_all_points(p, entries)
     for k in sorted(values):
@@ -120,7 +120,7 @@ def function(
     return f"{declaration};\n\n{declaration}\n{{\n{body}\n}}\n", p.temporaries
 
 
-def _target(p: _CellPrinter, task: str, x: Entry) -> int:
+def _target(p: _CellPrinter, task: str, x: OutputEntry) -> int:
     if task == abi.Task.ENERGY:
         return 0
     row = p.positions[x.row.position]
@@ -138,7 +138,7 @@ def _table(p: Printer) -> None:
     p.line(1, "};")
 
 
-def _loop(p: Printer, loop: Loop, fields: Sequence[Entry]) -> None:
+def _loop(p: Printer, loop: Loop, fields: Sequence[OutputEntry]) -> None:
     """The loop over the points; `fields` are stored in it."""
     for s in loop.sums:
         p.line(1, f"double {p.fresh(s, 's')} = 0.0;")
@@ -152,11 +152,11 @@ def _loop(p: Printer, loop: Loop, fields: Sequence[Entry]) -> None:
     p.line(1, "}")
 
 
-def _store(p: Printer, depth: int, x: Entry) -> None:
+def _store(p: Printer, depth: int, x: OutputEntry) -> None:
     p.line(depth, f"A[{len(p.d.fields)} * q + {x.row.position}] += {p.ref(x.node)};")
 
 
-def _same_at_all_points(p: Printer, entries: Sequence[Entry]) -> None:
+def _same_at_all_points(p: Printer, entries: Sequence[OutputEntry]) -> None:
     """Fields that do not vary with the point."""
     fixed = [x for x in entries if not x.node.varying]
     if fixed:
@@ -181,8 +181,8 @@ def _mark(p: _CellPrinter, task: str) -> None:
 
 def source(definition: Definition, functions: Iterable[str], preamble: Iterable[str] = ()) -> str:
     """The C file of a kernel family; `preamble` are the routines that its functions call."""
-    places = ["#include <stddef.h>"] if definition.arrays else []
-    head = [_banner(definition), "#include <math.h>", *places, "#include <stdint.h>", ROOTS]
+    includes = ["#include <stddef.h>"] if definition.arrays else []
+    head = [_banner(definition), "#include <math.h>", *includes, "#include <stdint.h>", ROOTS]
     return "\n".join([*head, *preamble, *functions])
 
 

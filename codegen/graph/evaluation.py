@@ -18,7 +18,7 @@ from mpmath.libmp import NoConvergence
 
 from softehl.codegen.graph import matrix_functions
 from softehl.codegen.graph.bessel import Bessel
-from softehl.codegen.graph.graph import Input, Node, Op, ResultIndex, Routine
+from softehl.codegen.graph.graph import InputEntry, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.precise_arithmetic import arctangent, number
 from softehl.codegen.graph.routines import (
     HIGHEST_OF_STRETCHES,
@@ -26,19 +26,19 @@ from softehl.codegen.graph.routines import (
     External,
     Inverse,
     Isotropic,
-    Newton,
+    NewtonRoutine,
     depends,
 )
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine
 from softehl.codegen.graph.tensor_functions import (
     Eigenvalues,
     Exponential,
-    Part,
+    FunctionPart,
     TensorFunction,
     TensorRoutine,
     entry_pairs,
 )
-from softehl.codegen.graph.tensor_functions import Isotropic as TensorIsotropic
+from softehl.codegen.graph.tensor_functions import IsotropicFunction as TensorIsotropic
 from softehl.codegen.graph.term_reductions import Reduction, TermsLayout
 from softehl.codegen.graph.traversal import Recursion, reachable, recursion
 
@@ -50,7 +50,7 @@ Evaluate = Callable[[Sequence[Node], Vector, Vector], Vector]
 def results(r: Routine, args: Vector, evaluate: Evaluate) -> Vector:
     """Results of a routine in the working precision of mpmath; not-a-number where it has none."""
     match r:
-        case Newton():
+        case NewtonRoutine():
             return _newton(r, args, evaluate)
         case Inverse():
             inverted = mpmath.matrix(r.size, r.size)
@@ -81,7 +81,7 @@ def _of_array(r: ArrayRoutine, array: Vector, rate: Sequence[Number], args: Vect
     return r.results(array, rate, args, functions)
 
 
-def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
+def _newton(r: NewtonRoutine, args: Vector, evaluate: Evaluate) -> Vector:
     p, s = args[: r.inputs - r.outputs], args[r.inputs - r.outputs :]
     previous, A = mpmath.inf, None
     for _ in range(200):
@@ -105,7 +105,7 @@ def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
 _CLOSE = 1e-8
 
 
-def _jacobian(r: Newton, s: Vector, p: Vector, evaluate: Evaluate) -> mpmath.matrix:
+def _jacobian(r: NewtonRoutine, s: Vector, p: Vector, evaluate: Evaluate) -> mpmath.matrix:
     """dg/ds by differences."""
     h = mpmath.mpf(10) ** (-mpmath.mp.dps // 3)
     A = mpmath.matrix(len(s), len(s))
@@ -153,7 +153,7 @@ def _tensor(r: TensorRoutine, args: Vector, evaluate: Evaluate) -> Vector:
     n = f.entries
     external = args[n : n + f.externals]
     digits = mpmath.mp.dps
-    if r.part is not Part.VALUE:
+    if r.part is not FunctionPart.VALUE:
         with mpmath.workdps(3 * digits):
             return _tensor_derivative(r, args, evaluate, mpmath.mpf(10) ** (-3 * digits // 4))
     return _tensor_value(f, args[:n], external, evaluate)
@@ -169,20 +169,20 @@ def _tensor_derivative(r: TensorRoutine, args: Vector, evaluate: Evaluate, h: Nu
         return _tensor_value(f, x, external, evaluate)
 
     def rate(x: Vector, j: int, of: Callable[[Vector], Vector]) -> Vector:
-        after, before = (of([v + t * h * (k == j) for k, v in enumerate(x)]) for t in (1, -1))
-        return [(a - b) / (2 * h) for a, b in zip(after, before, strict=True)]
+        plus, minus = (of([v + t * h * (k == j) for k, v in enumerate(x)]) for t in (1, -1))
+        return [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
 
     x = args[:n]
-    if r.part is Part.CURVATURE:
+    if r.part is FunctionPart.CURVATURE:
         along = [partial(rate, j=j, of=value) for j in range(n)]
         return [mpmath.fdot(p, rate(x, i, along[j])) for i in range(n) for j in range(i, n)]
-    slopes = [rate(x, j, value) for j in range(n)]
-    if r.part is Part.ADJOINT:
-        return [mpmath.fdot(p, column) for column in slopes]
+    derivatives = [rate(x, j, value) for j in range(n)]
+    if r.part is FunctionPart.ADJOINT:
+        return [mpmath.fdot(p, column) for column in derivatives]
     results = []
-    for k in range(f.slopes):
+    for k in range(f.slope_count):
         i, j, factor = f.slope_index(k)
-        results.append(slopes[j][i] * factor.numerator / factor.denominator)
+        results.append(derivatives[j][i] * factor.numerator / factor.denominator)
     return results
 
 
@@ -267,7 +267,7 @@ def _localised(values: Sequence[Node], local: Vector, external: Vector) -> Vecto
     nodes = []
     for n in reachable(values):
         if n.op is Op.INPUT:
-            assert isinstance(n.payload, Input)
+            assert isinstance(n.payload, InputEntry)
             at[n] = arrays[n.payload.array][n.payload.index]
     for value in values:
         nodes.append(_value_at(value, at))
@@ -316,7 +316,7 @@ _BINARY: dict[Op, Callable[[Number, Number], Number]] = {
 
 
 @dataclass(frozen=True)
-class State:
+class EvaluationState:
     """Arguments of one element: exact numbers, as doubles or mpmath values.
 
     `rule` holds rows (coordinates..., weight); `basis` [point][mode] = (value, xi-derivative)
@@ -341,7 +341,7 @@ class Walk:
 
     def __init__(
         self,
-        state: State,
+        state: EvaluationState,
         frozen: Mapping[tuple[Node, int], Number],
         dofs: Vector | None = None,
     ) -> None:
@@ -381,7 +381,7 @@ class Walk:
             case Op.PI:
                 return +mpmath.pi
             case Op.INPUT:
-                assert isinstance(n.payload, Input)
+                assert isinstance(n.payload, InputEntry)
                 return self._input(n.payload, q)
             case Op.SUM:
                 terms = []
@@ -435,7 +435,7 @@ class Walk:
         walk.arrays = {"local": local, "external": external}
         return [walk.value(n) for n in values]
 
-    def _input(self, source: Input, q: int) -> Number:
+    def _input(self, source: InputEntry, q: int) -> Number:
         if source.array == "rule":
             return mpmath.mpf(self.state.rule[q][source.index])
         if source.array == "point data":
@@ -458,11 +458,11 @@ def evaluate(root: Node, inputs: Mapping[tuple[str, int], Number], digits: int =
     """Value of a graph without loops, for the tests of passes and derivatives."""
     arrays: dict[str, Vector] = {}
     for n in reachable([root]):
-        if isinstance(n.payload, Input):
+        if isinstance(n.payload, InputEntry):
             column = arrays.setdefault(n.payload.array, [])
             column += [0] * (n.payload.index + 1 - len(column))
             column[n.payload.index] = inputs[n.payload.array, n.payload.index]
     with mpmath.workdps(digits):
-        walk = Walk(State((), ()), {})
+        walk = Walk(EvaluationState((), ()), {})
         walk.arrays = {k: exact(v) for k, v in arrays.items()}
         return walk.value(root)

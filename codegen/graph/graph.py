@@ -79,7 +79,7 @@ FREE = frozenset({Op.CONST, Op.PI, Op.INPUT, Op.NAME})
 
 
 @dataclass(frozen=True)
-class Input:
+class InputEntry:
     """One scalar argument of a kernel: `array[index]`, at the point when it varies."""
 
     array: str
@@ -127,7 +127,7 @@ class Routine:
         raise NotImplementedError
 
 
-Payload = Fraction | Input | str | ResultIndex | Routine | None
+Payload = Fraction | InputEntry | str | ResultIndex | Routine | None
 
 
 class Node:
@@ -181,7 +181,7 @@ class Graph:
         key = (op, tuple(a.id for a in args), payload)
         existing = self._table.get(key)
         if existing is None:
-            varying = (isinstance(payload, Input) and payload.varying) or (
+            varying = (isinstance(payload, InputEntry) and payload.varying) or (
                 op is not Op.SUM and any(a.varying for a in args)
             )
             existing = self._table[key] = Node(len(self._table), op, args, payload, varying)
@@ -196,7 +196,7 @@ class Graph:
         return self.node(Op.PI)
 
     def input(self, array: str, index: int, *, varying: bool = False) -> Node:
-        return self.node(Op.INPUT, (), Input(array, index, varying))
+        return self.node(Op.INPUT, (), InputEntry(array, index, varying))
 
     def name(self, label: str, value: Node) -> Node:
         """Give `value` an identity that differentiation can refer to."""

@@ -16,7 +16,7 @@ from softehl.codegen.external_function import HIGHEST, ExternalFunction
 from softehl.codegen.external_function import upper as upper_entry
 from softehl.codegen.graph.differentiation import gradient
 from softehl.codegen.graph.divided_difference import Divided, exchange_inputs
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, ResultIndex, Routine
+from softehl.codegen.graph.graph import BOOLEAN, Graph, InputEntry, Node, Op, ResultIndex, Routine
 from softehl.codegen.graph.guarded_products import guarded, plus
 from softehl.codegen.graph.partial_derivatives import DifferentiationError
 from softehl.codegen.graph.traversal import reachable, substitute, written_out
@@ -76,7 +76,7 @@ def unroll_sums(
 
     def leaf(n: Node, q: int) -> Node:
         source = n.payload
-        assert isinstance(source, Input)
+        assert isinstance(source, InputEntry)
         return g.const(points[q][source.index]) if source.array == "rule" else n
 
     return written_out(g, values, len(points), leaf, inside)
@@ -122,7 +122,7 @@ class Control:
 
 
 @dataclass(frozen=True, eq=False)
-class Newton(Routine):
+class NewtonRoutine(Routine):
     """Solution s of g(s, p) = 0 by Newton's method; operands: p, then the start of s.
 
     `by_local` is dg/ds, `by_external` dg/dp; all are localised.  The derivatives of s are those of
@@ -177,13 +177,13 @@ def _contracted(g: Graph, a: Sequence[Node], b: Sequence[Node]) -> Node:
     return total
 
 
-def newton(g: Graph, name: str, local: LocalisedValues, control: Control) -> Newton:
+def newton(g: Graph, name: str, local: LocalisedValues, control: Control) -> NewtonRoutine:
     """The routine that solves `local.values` = 0 for as many local unknowns."""
     count = len(local.values)
     s = [g.input("local", k) for k in range(count)]
     p = [g.input("external", k) for k in range(len(local.external))]
     gradients = [gradient(g, value, [*s, *p]) for value in local.values]
-    return Newton(
+    return NewtonRoutine(
         name,
         len(p) + count,
         count,
@@ -362,19 +362,19 @@ def _third_derivatives(g: Graph, c: Sequence[Node], first: Sequence[Node]) -> li
         for j in range(i, 3):
             bent = gradient(g, gradient(g, first[i], c)[c[j]], c)
             third += [bent[a] for a in c[j:]]
-    slopes = []
+    derivatives = []
     divided = [exchange_inputs(g, [first[a]], c[a], c[b])(first[a]) for a, b in PAIRS]
     for d, (a, b) in zip(divided, PAIRS, strict=True):
         for k in range(3):
             if k in (a, b):
                 other = g.input("local", 3 + k)
                 moved = Divided(g, {c[k]: other}, g.sub(c[k], other), {c[k]: g.one})
-                slopes.append(moved(d))
+                derivatives.append(moved(d))
             else:
                 slope = gradient(g, first[a], c)[c[k]]
-                slopes.append(exchange_inputs(g, [slope], c[a], c[b])(slope))
+                derivatives.append(exchange_inputs(g, [slope], c[a], c[b])(slope))
     d_13 = divided[1]
-    return [*third, *slopes, exchange_inputs(g, [d_13], c[0], c[1])(d_13)]
+    return [*third, *derivatives, exchange_inputs(g, [d_13], c[0], c[1])(d_13)]
 
 
 # ------------------------------------------------------------------------- functions of the user
@@ -398,16 +398,17 @@ class External(Routine):
         m, n, args = f.inputs, f.outputs, item.args[0].args[self.inputs - f.inputs :]
         if k < n:
             call = self._up_to(g, 1, call)
-            places = [n + k * m + j for j in range(m)]
+            positions = [n + k * m + j for j in range(m)]
         elif k < n * (1 + m):
             call = self._up_to(g, 2, call)
             k, i = divmod(k - n, m)
             start = n * (1 + m) + k * m * (m + 1) // 2
-            places = [start + upper_entry(m, i, j) for j in range(m)]
+            positions = [start + upper_entry(m, i, j) for j in range(m)]
         else:
             raise DifferentiationError(self._missing(3))
         return [
-            (a, g.node(Op.ITEM, (call,), ResultIndex(p))) for a, p in zip(args, places, strict=True)
+            (a, g.node(Op.ITEM, (call,), ResultIndex(p)))
+            for a, p in zip(args, positions, strict=True)
         ]
 
     def _up_to(self, g: Graph, order: int, call: Node) -> Node:
@@ -438,9 +439,9 @@ class External(Routine):
             )
         else:
             remedy = f"return them as {'d' * order}y and say derivatives={order}"
-        place = f"{self.where}: " if self.where else ""
+        context = f"{self.where}: " if self.where else ""
         return (
-            f"{place}{f.name} has derivatives of order {f.orders}, and the kernel needs those of "
+            f"{context}{f.name} has derivatives of order {f.orders}, and the kernel needs those of "
             f"order {order}: {remedy}"
         )
 
@@ -452,16 +453,16 @@ def external(name: str, f: ExternalFunction, *, order: int = 0, where: str = "")
 
 def external_functions(roots: Iterable[Node]) -> dict[Node, ExternalFunction]:
     """Calls of C functions below some values, also those inside other routines."""
-    found: dict[Node, ExternalFunction] = {}
+    functions: dict[Node, ExternalFunction] = {}
     waiting, seen = [list(roots)], set[Routine]()
     while waiting:
         for n in reachable(waiting.pop()):
             if isinstance(n.payload, External):
-                found[n] = n.payload.function
+                functions[n] = n.payload.function
             elif isinstance(n.payload, Routine) and n.payload not in seen:
                 seen.add(n.payload)
                 waiting.append(_inside(n.payload))
-    return found
+    return functions
 
 
 def _inside(r: Routine) -> list[Node]:

@@ -54,7 +54,7 @@ class ArrayLayout:
 
 
 @dataclass(frozen=True)
-class RunTimeArray:
+class ArraySymbol:
     """An array of a kernel by name, with its meaning and its layout."""
 
     name: str
@@ -147,7 +147,7 @@ def _row(knots: Sequence[Number], t: Number) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Table(ArrayRoutine):
+class TableRoutine(ArrayRoutine):
     """Value and three derivatives of a curve; operands: argument, amount."""
 
     _family: dict[str, ArrayRoutine] = field(default_factory=dict)
@@ -185,11 +185,11 @@ class TableQuotient(ArrayRoutine):
     """Divided differences of the value and three derivatives of a curve: operands u, v, amount."""
 
 
-def table(name: str, array: int, layout: TableLayout) -> Table:
+def table(name: str, array: int, layout: TableLayout) -> TableRoutine:
     """The routine of a curve."""
     family: dict[str, ArrayRoutine] = {}
-    value = Table(name, 2, 4, array, layout, rate=False, _family=family)
-    rate = Table(f"{name}_rate", 2, 4, array, layout, rate=True, _family=family)
+    value = TableRoutine(name, 2, 4, array, layout, rate=False, _family=family)
+    rate = TableRoutine(f"{name}_rate", 2, 4, array, layout, rate=True, _family=family)
     for key, routine in (("", value), ("rate", rate)):
         family[key] = routine
         label = f"divided_{routine.name}"

@@ -26,7 +26,7 @@ from softehl.codegen.graph.traversal import rewrite
 Nodes = list[Node]
 
 
-class Part(StrEnum):
+class FunctionPart(StrEnum):
     """Results of a routine of a tensor function.
 
     With Y(x) the results and x the entries of the matrix: VALUE Y; ADJOINT sum of p_i dY_i/dx_j;
@@ -44,7 +44,7 @@ class TensorRoutine(Routine):
     """Part of a tensor function; operands: entries x, external values, and p where it has one."""
 
     function: TensorFunction
-    part: Part
+    part: FunctionPart
 
     def partials(self, g: Graph, item: Node) -> list[tuple[Node, Node]]:
         assert isinstance(item.payload, ResultIndex)
@@ -52,15 +52,15 @@ class TensorRoutine(Routine):
 
     @property
     def joint(self) -> bool:
-        return self.part is Part.VALUE
+        return self.part is FunctionPart.VALUE
 
     def pullback(self, g: Graph, call: Node, seeds: Mapping[int, Node]) -> list[tuple[Node, Node]]:
         f, args = self.function, call.args
         p = [seeds.get(k, g.zero) for k in range(self.outputs)]
-        pairs = list(zip(args, f.run(g, Part.ADJOINT, [*args, *p]), strict=False))
+        pairs = list(zip(args, f.run(g, FunctionPart.ADJOINT, [*args, *p]), strict=False))
         for j, by in f.by_externals(g).items():
             total = g.zero
-            for value, seed in zip(by.run(g, Part.VALUE, args), p, strict=True):
+            for value, seed in zip(by.run(g, FunctionPart.VALUE, args), p, strict=True):
                 total = g.add(total, g.mul(seed, value))
             pairs.append((args[f.entries + j], total))
         return pairs
@@ -78,7 +78,7 @@ class TensorFunction:
     what: str
     size: int
     externals: int = 0
-    _routines: dict[Part, TensorRoutine] = field(default_factory=dict)
+    _routines: dict[FunctionPart, TensorRoutine] = field(default_factory=dict)
 
     @property
     def entries(self) -> int:
@@ -91,32 +91,32 @@ class TensorFunction:
         return self.entries
 
     @property
-    def slopes(self) -> int:
+    def slope_count(self) -> int:
         """Number of results of the slope."""
         return self.results * self.entries
 
-    def routine(self, part: Part) -> TensorRoutine:
+    def routine(self, part: FunctionPart) -> TensorRoutine:
         """The routine of a part, each made once."""
         if part not in self._routines:
             n = self.entries
             outputs = {
-                Part.VALUE: self.results,
-                Part.ADJOINT: n,
-                Part.SLOPE: self.slopes,
-                Part.CURVATURE: n * (n + 1) // 2,
+                FunctionPart.VALUE: self.results,
+                FunctionPart.ADJOINT: n,
+                FunctionPart.SLOPE: self.slope_count,
+                FunctionPart.CURVATURE: n * (n + 1) // 2,
             }[part]
-            along = self.results if part in (Part.ADJOINT, Part.CURVATURE) else 0
+            along = self.results if part in (FunctionPart.ADJOINT, FunctionPart.CURVATURE) else 0
             inputs = n + self.externals + along
             self._routines[part] = TensorRoutine(f"{self.name}_{part}", inputs, outputs, self, part)
         return self._routines[part]
 
-    def run(self, g: Graph, part: Part, args: Sequence[Node]) -> Nodes:
+    def run(self, g: Graph, part: FunctionPart, args: Sequence[Node]) -> Nodes:
         """Results of a part."""
         return g.run(self.routine(part), args)
 
-    def slope(self, g: Graph, slopes: Sequence[Node], i: int, j: int) -> Node:
+    def slope(self, g: Graph, derivatives: Sequence[Node], i: int, j: int) -> Node:
         """dY_i/dx_j among the results of the slope."""
-        return slopes[i * self.entries + j]
+        return derivatives[i * self.entries + j]
 
     def slope_index(self, k: int) -> tuple[int, int, Fraction]:
         """Result k of the slope is dY_i/dx_j times a number: i, j and the number."""
@@ -127,21 +127,21 @@ class TensorFunction:
         return {}
 
     def partials(
-        self, g: Graph, part: Part, args: Sequence[Node], k: int
+        self, g: Graph, part: FunctionPart, args: Sequence[Node], k: int
     ) -> list[tuple[Node, Node]]:
         """Derivatives of result k of a part by the operands."""
         n = self.entries
         x, fixed, p = args[:n], args[: n + self.externals], args[n + self.externals :]
         pairs = []
-        if part is Part.VALUE:
-            slopes = self.run(g, Part.SLOPE, fixed)
-            pairs += [(x[j], self.slope(g, slopes, k, j)) for j in range(n)]
-        elif part is Part.ADJOINT:
-            slopes = self.run(g, Part.SLOPE, fixed)
-            curvature = self.run(g, Part.CURVATURE, args)
+        if part is FunctionPart.VALUE:
+            derivatives = self.run(g, FunctionPart.SLOPE, fixed)
+            pairs += [(x[j], self.slope(g, derivatives, k, j)) for j in range(n)]
+        elif part is FunctionPart.ADJOINT:
+            derivatives = self.run(g, FunctionPart.SLOPE, fixed)
+            curvature = self.run(g, FunctionPart.CURVATURE, args)
             pairs += [(x[j], curvature[_upper(n, k, j)]) for j in range(n)]
-            pairs += [(q, self.slope(g, slopes, i, k)) for i, q in enumerate(p)]
-        elif part is Part.SLOPE:
+            pairs += [(q, self.slope(g, derivatives, i, k)) for i, q in enumerate(p)]
+        elif part is FunctionPart.SLOPE:
             i, j, factor = self.slope_index(k)
             curvature = self._curvature_of(g, fixed, i)
             scaled = g.const(factor)
@@ -160,25 +160,27 @@ class TensorFunction:
     def _curvature_of(self, g: Graph, fixed: Sequence[Node], i: int) -> Nodes:
         """Second derivatives of result i alone."""
         unit = [g.one if m == i else g.zero for m in range(self.results)]
-        return self.run(g, Part.CURVATURE, [*fixed, *unit])
+        return self.run(g, FunctionPart.CURVATURE, [*fixed, *unit])
 
-    def lowered(self, g: Graph, part: Part, args: Sequence[Node]) -> Nodes:
+    def lowered(self, g: Graph, part: FunctionPart, args: Sequence[Node]) -> Nodes:
         """Results of a part in nodes and routines that are printed."""
         n = self.entries
         fixed, p = args[: n + self.externals], args[n + self.externals :]
-        if part is not Part.ADJOINT:
+        if part is not FunctionPart.ADJOINT:
             return self.printed(g, part, fixed, p)
-        slopes = self.printed(g, Part.SLOPE, fixed, ())
+        derivatives = self.printed(g, FunctionPart.SLOPE, fixed, ())
         totals = []
         for j in range(n):
             total = g.zero
             for i, q in enumerate(p):
-                total = g.add(total, g.mul(q, self.slope(g, slopes, i, j)))
+                total = g.add(total, g.mul(q, self.slope(g, derivatives, i, j)))
             totals.append(total)
         return totals
 
     @abstractmethod
-    def printed(self, g: Graph, part: Part, fixed: Sequence[Node], p: Sequence[Node]) -> Nodes:
+    def printed(
+        self, g: Graph, part: FunctionPart, fixed: Sequence[Node], p: Sequence[Node]
+    ) -> Nodes:
         """The value, the slope or the curvature in nodes and routines that are printed."""
 
 
@@ -197,7 +199,7 @@ def entry_pairs(size: int) -> list[tuple[int, int]]:
 # ----------------------------------------------------------------------------- printed routines
 
 
-class Kind(StrEnum):
+class KernelKind(StrEnum):
     """Printed routines; operands and results are those of `emit.tensor_routines`."""
 
     EIGEN = "eigen"
@@ -211,32 +213,32 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Kernel(Routine):
+class MatrixKernel(Routine):
     """A printed routine of matrices of `size` rows, without derivatives."""
 
-    kind: Kind
+    kind: KernelKind
     size: int
 
     def partials(self, g: Graph, item: Node) -> list[tuple[Node, Node]]:
         raise AssertionError(f"{self.name} is made after all derivatives are taken")
 
 
-def _kernels(size: int) -> dict[tuple[Kind, int], Kernel]:
+def _kernels(size: int) -> dict[tuple[KernelKind, int], MatrixKernel]:
     n, full = size, size * size
     entries = n * (n + 1) // 2
     pairs, triples = entries - n, n * (n - 1) * (n - 2) // 6
     triangle = entries * (entries + 1) // 2
     table = {
-        Kind.EIGEN: (entries, n + full),
-        Kind.SUM: (n + full, entries),
-        Kind.SLOPE: (entries + full, triangle),
-        Kind.CURVATURE: (n + 2 * pairs + triples + full + entries, triangle),
-        Kind.BENDING: (n + full + n, triangle),
-        Kind.EXP: (full, full),
-        Kind.EXP_SLOPE: (full, full * full),
-        Kind.EXP_CURVATURE: (2 * full, full * (full + 1) // 2),
+        KernelKind.EIGEN: (entries, n + full),
+        KernelKind.SUM: (n + full, entries),
+        KernelKind.SLOPE: (entries + full, triangle),
+        KernelKind.CURVATURE: (n + 2 * pairs + triples + full + entries, triangle),
+        KernelKind.BENDING: (n + full + n, triangle),
+        KernelKind.EXP: (full, full),
+        KernelKind.EXP_SLOPE: (full, full * full),
+        KernelKind.EXP_CURVATURE: (2 * full, full * (full + 1) // 2),
     }
-    return {(k, n): Kernel(f"{k}_{n}", *counts, k, n) for k, counts in table.items()}
+    return {(k, n): MatrixKernel(f"{k}_{n}", *counts, k, n) for k, counts in table.items()}
 
 
 KERNELS = {**_kernels(2), **_kernels(3)}
@@ -246,7 +248,7 @@ KERNELS = {**_kernels(2), **_kernels(3)}
 
 
 @dataclass(eq=False)
-class Isotropic(TensorFunction):
+class IsotropicFunction(TensorFunction):
     """sum of f(c_a) n_a n_a of a symmetric matrix with eigenvalues c_a and vectors n_a.
 
     f: a node of the input `local` 0, the eigenvalue, and of `external` ones.
@@ -257,14 +259,14 @@ class Isotropic(TensorFunction):
     _differences: list[Node] = field(default_factory=list)
 
     @property
-    def slopes(self) -> int:
+    def slope_count(self) -> int:
         return self.entries * (self.entries + 1) // 2
 
     def _multiplicity(self, j: int) -> int:
         return 1 if j < self.size else 2
 
-    def slope(self, g: Graph, slopes: Sequence[Node], i: int, j: int) -> Node:
-        value = slopes[_upper(self.entries, i, j)]
+    def slope(self, g: Graph, derivatives: Sequence[Node], i: int, j: int) -> Node:
+        value = derivatives[_upper(self.entries, i, j)]
         return g.mul(g.const(self._multiplicity(j)), value)
 
     def slope_index(self, k: int) -> tuple[int, int, Fraction]:
@@ -278,14 +280,16 @@ class Isotropic(TensorFunction):
             sources = [g.input("external", j) for j in range(self.externals)]
             for j, slope in enumerate(map(gradient(g, self.f, sources).__getitem__, sources)):
                 if slope is not g.zero:
-                    self._by_externals[j] = Isotropic(
+                    self._by_externals[j] = IsotropicFunction(
                         f"{self.name}_by_{j}", self.what, self.size, self.externals, f=slope
                     )
         return self._by_externals
 
-    def printed(self, g: Graph, part: Part, fixed: Sequence[Node], p: Sequence[Node]) -> Nodes:
+    def printed(
+        self, g: Graph, part: FunctionPart, fixed: Sequence[Node], p: Sequence[Node]
+    ) -> Nodes:
         n, size = self.entries, self.size
-        eigen = g.run(KERNELS[Kind.EIGEN, size], fixed[:n])
+        eigen = g.run(KERNELS[KernelKind.EIGEN, size], fixed[:n])
         c, Q, external = eigen[:size], eigen[size:], fixed[n:]
         f, slope, second, divided, twice = self.differences(g)
 
@@ -294,17 +298,17 @@ class Isotropic(TensorFunction):
             return _ordered_quotients(g, lifted)[0]
 
         pairs = [(a, b) for a in range(size) for b in range(a + 1, size)]
-        if part is Part.VALUE:
-            return g.run(KERNELS[Kind.SUM, size], [*(at(f, a) for a in range(size)), *Q])
-        if part is Part.SLOPE:
+        if part is FunctionPart.VALUE:
+            return g.run(KERNELS[KernelKind.SUM, size], [*(at(f, a) for a in range(size)), *Q])
+        if part is FunctionPart.SLOPE:
             first = [at(slope, a) for a in range(size)] + [at(divided, a, b) for a, b in pairs]
-            return g.run(KERNELS[Kind.SLOPE, size], [*first, *Q])
+            return g.run(KERNELS[KernelKind.SLOPE, size], [*first, *Q])
         # f[x, y, z] is that of f[x, z] between x and y: these are the two farthest apart
         higher = [at(second, a) for a in range(size)]
         higher += [at(twice, *which) for a, b in pairs for which in ((a, b, a), (b, a, b))]
         if size == 3:
             higher.append(at(twice, 0, 2, 1))
-        return g.run(KERNELS[Kind.CURVATURE, size], [*higher, *Q, *p])
+        return g.run(KERNELS[KernelKind.CURVATURE, size], [*higher, *Q, *p])
 
     def differences(self, g: Graph) -> list[Node]:
         """f(x), f'(x), f''(x) / 2, f[x, y] and f[x, y, z] as functions of the inputs `local`.
@@ -357,20 +361,22 @@ class Eigenvalues(TensorFunction):
     def results(self) -> int:
         return self.size
 
-    def printed(self, g: Graph, part: Part, fixed: Sequence[Node], p: Sequence[Node]) -> Nodes:
+    def printed(
+        self, g: Graph, part: FunctionPart, fixed: Sequence[Node], p: Sequence[Node]
+    ) -> Nodes:
         n = self.size
-        eigen = g.run(KERNELS[Kind.EIGEN, n], fixed)
+        eigen = g.run(KERNELS[KernelKind.EIGEN, n], fixed)
         c, Q = eigen[:n], eigen[n:]
-        if part is Part.VALUE:
+        if part is FunctionPart.VALUE:
             return c
-        if part is Part.CURVATURE:
-            return g.run(KERNELS[Kind.BENDING, n], [*c, *Q, *p])
-        slopes = []
+        if part is FunctionPart.CURVATURE:
+            return g.run(KERNELS[KernelKind.BENDING, n], [*c, *Q, *p])
+        derivatives = []
         for a in range(n):
             for i, j in entry_pairs(n):
                 product = g.mul(Q[n * i + a], Q[n * j + a])
-                slopes.append(product if i == j else g.mul(g.const(2), product))
-        return slopes
+                derivatives.append(product if i == j else g.mul(g.const(2), product))
+        return derivatives
 
 
 @dataclass(eq=False)
@@ -381,11 +387,13 @@ class Exponential(TensorFunction):
     def entries(self) -> int:
         return self.size * self.size
 
-    def printed(self, g: Graph, part: Part, fixed: Sequence[Node], p: Sequence[Node]) -> Nodes:
+    def printed(
+        self, g: Graph, part: FunctionPart, fixed: Sequence[Node], p: Sequence[Node]
+    ) -> Nodes:
         kinds = {
-            Part.VALUE: Kind.EXP,
-            Part.SLOPE: Kind.EXP_SLOPE,
-            Part.CURVATURE: Kind.EXP_CURVATURE,
+            FunctionPart.VALUE: KernelKind.EXP,
+            FunctionPart.SLOPE: KernelKind.EXP_SLOPE,
+            FunctionPart.CURVATURE: KernelKind.EXP_CURVATURE,
         }
         return g.run(KERNELS[kinds[part], self.size], [*fixed, *p])
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op
+from softehl.codegen.graph.graph import BOOLEAN, Graph, InputEntry, Node, Op
 from softehl.codegen.graph.traversal import reachable
 
 Known = frozenset[Node]
@@ -91,7 +91,7 @@ class Domain:
     def _is_condition(self, n: Node) -> bool:
         """True if a value comes from parameters, data and constants alone."""
         if n not in self._fixed:
-            sources = {m.payload.array for m in reachable([n]) if isinstance(m.payload, Input)}
+            sources = {m.payload.array for m in reachable([n]) if isinstance(m.payload, InputEntry)}
             called = any(m.op is Op.CALL for m in reachable([n]))
             self._fixed[n] = sources <= _GIVEN and not called
         return self._fixed[n]

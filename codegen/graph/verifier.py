@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, ResultIndex, Routine
+from softehl.codegen.graph.graph import (
+    BOOLEAN,
+    ELEMENTARY,
+    InputEntry,
+    Node,
+    Op,
+    ResultIndex,
+    Routine,
+)
 from softehl.codegen.graph.traversal import reachable
 from softehl.errors import SoftehlError
 
@@ -26,7 +34,7 @@ ARITY: dict[Op, int] = {
 PAYLOAD: dict[Op, type] = {
     Op.CONST: Fraction,
     Op.POW: Fraction,
-    Op.INPUT: Input,
+    Op.INPUT: InputEntry,
     Op.NAME: str,
     Op.CALL: Routine,
     Op.ITEM: ResultIndex,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.abaqus_deck import deck, degrees
@@ -20,7 +20,7 @@ from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.test_states import samples
 
 
-def uel(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def uel(interface: ElementInterface, states: Sequence[EvaluationState]) -> dict[str, str]:
     """Every file of a user element."""
     require(interface, "abaqus")
     texts, kernel = c_interface.files(interface, single=True)

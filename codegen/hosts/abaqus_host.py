@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
 from softehl.codegen.hosts.element_interface import (
@@ -42,20 +42,24 @@ def dt_of(interface: ElementInterface) -> float:
     return dict(interface.definition.example).get("dt", 1.0)
 
 
-def with_time_step(interface: ElementInterface, states: Sequence[State]) -> list[State]:
+def with_time_step(
+    interface: ElementInterface, states: Sequence[EvaluationState]
+) -> list[EvaluationState]:
     """States whose values of the step before are those of the state before in the list."""
     return [_stepped(interface, s, states[k - 1].dofs) for k, s in enumerate(states)]
 
 
-def _stepped(interface: ElementInterface, state: State, previous: Sequence[float]) -> State:
+def _stepped(
+    interface: ElementInterface, state: EvaluationState, previous: Sequence[float]
+) -> EvaluationState:
     dt = dt_of(interface)
 
     def value(source: Source, default: float) -> float:
         match source:
             case TimeStepValue(what):
                 return dt if what == "dt" else 1 / dt
-            case PreviousValue(place, rate):
-                return -previous[place] / dt if rate else previous[place]
+            case PreviousValue(dof, rate):
+                return -previous[dof] / dt if rate else previous[dof]
         return default
 
     return replace(

@@ -8,7 +8,7 @@ from dataclasses import replace
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts import material_common as shared
 from softehl.codegen.hosts.abaqus_element import uel
-from softehl.codegen.hosts.material_response import Measure, Response, checked, response
+from softehl.codegen.hosts.material_response import MaterialResponse, Measure, checked, response
 from softehl.codegen.hosts.registry import Host, StatesOf
 from softehl.codegen.language.material import Law
 
@@ -39,7 +39,7 @@ def umat(law: Law, states: StatesOf) -> dict[str, str]:
 ABAQUS = Host(element=uel, material=umat)
 
 
-def _deformation(r: Response) -> str:
+def _deformation(r: MaterialResponse) -> str:
     """Lines of C that fill the unknowns of the law."""
     if r.measure is Measure.SMALL:
         return (
@@ -53,7 +53,7 @@ def _deformation(r: Response) -> str:
     )
 
 
-def _deck(r: Response, settings: Sequence[float]) -> str:
+def _deck(r: MaterialResponse, settings: Sequence[float]) -> str:
     nodes, elements, constraints = shared.block()
     unsymmetric = "" if r.symmetric else ", UNSYMM"
     large = "NO" if r.measure is Measure.SMALL else "YES"

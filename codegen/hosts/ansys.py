@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts import material_common as shared
-from softehl.codegen.hosts.material_response import Measure, Response, checked, response
+from softehl.codegen.hosts.material_response import MaterialResponse, Measure, checked, response
 from softehl.codegen.hosts.registry import Host, StatesOf
 from softehl.codegen.language.material import Law
 
@@ -62,7 +62,7 @@ _LARGE = """\
 """
 
 
-def deck(r: Response, settings: Sequence[float]) -> str:
+def deck(r: MaterialResponse, settings: Sequence[float]) -> str:
     """A block of four elements a side, stretched and twisted, in APDL."""
     nodes, elements, constraints = shared.block()
     constants = [line for line in shared.constants(r, settings) if not line.startswith("**")]

@@ -31,9 +31,9 @@ def files(
     kernel = pipeline.compile_model(interface.definition)
     lanes = [c_source.ONE_LANE] if single else []
     external = {f"{f.symbol}.c" for f in functions_of_user(interface.definition).values()}
-    before = [text for file, text in kernel.shared.items() if file not in external]
+    own_parts = [text for file, text in kernel.shared.items() if file not in external]
     after = [text for file, text in kernel.shared.items() if file in external]
-    parts = [*lanes, *map(_private, before), kernel.text, functions(interface), *after]
+    parts = [*lanes, *map(_private, own_parts), kernel.text, functions(interface), *after]
     names = [abi.function_name(interface.name, t) for t in kernel.functions]
     return {
         f"{interface.name}.h": header(interface),
@@ -110,8 +110,8 @@ def argument_rows(
             yield f"{entry.format(label, k + base)}  {a.name}: {a.meaning}"
     for k, array in enumerate(d.arrays):
         first = len(d.parameters) + ARRAY_ENTRIES * k + base
-        places = ", ".join(entry.format("p", first + i) for i in range(ARRAY_ENTRIES))
-        yield f"{places}  place in p and length of {array.name}, and 0; {array.meaning}:"
+        entries = ", ".join(entry.format("p", first + i) for i in range(ARRAY_ENTRIES))
+        yield f"{entries}  place in p and length of {array.name}, and 0; {array.meaning}:"
         yield f"    {array.layout.content}"
     for k, (name, _) in enumerate(d.fields):
         yield f"{entry.format('fields', k + base)}  {name}"

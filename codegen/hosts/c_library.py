@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from softehl.codegen.abi import Task
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.material_response import at_one_point
@@ -21,12 +21,12 @@ DIFFERENCE = 1e-5
 FLAGS = "-O2 -fno-math-errno -ffp-contract=fast -Wno-psabi"
 
 
-def c(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def c(interface: ElementInterface, states: Sequence[EvaluationState]) -> dict[str, str]:
     """Every file of target `c`."""
     return _files(interface, states, "c")
 
 
-def cpp(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def cpp(interface: ElementInterface, states: Sequence[EvaluationState]) -> dict[str, str]:
     """Every file of target `cpp`: the same library, called from C++."""
     return _files(interface, states, "cpp")
 
@@ -35,7 +35,9 @@ C = Host(element=c, material=at_one_point(c), arrays=True)
 CPP = Host(element=cpp, material=at_one_point(cpp), arrays=True)
 
 
-def _files(interface: ElementInterface, states: Sequence[State], suffix: str) -> dict[str, str]:
+def _files(
+    interface: ElementInterface, states: Sequence[EvaluationState], suffix: str
+) -> dict[str, str]:
     texts, kernel = c_interface.files(interface)
     references = samples(interface, kernel, states)
     substitutions = {"name": interface.name, "suffix": suffix, "flags": FLAGS, **_language(suffix)}

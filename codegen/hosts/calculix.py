@@ -7,7 +7,13 @@ from dataclasses import replace
 
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts import material_common as shared
-from softehl.codegen.hosts.material_response import Measure, Response, checked, packed, response
+from softehl.codegen.hosts.material_response import (
+    MaterialResponse,
+    Measure,
+    checked,
+    packed,
+    response,
+)
 from softehl.codegen.hosts.registry import Host, StatesOf
 from softehl.codegen.language.material import Law
 
@@ -48,7 +54,7 @@ def _names(law: Law) -> dict[str, str]:
     return {"FUNCTION": function, "LIBRARY": library, "MATERIAL": f"@{library}_{function}"}
 
 
-def _deformation(r: Response) -> str:
+def _deformation(r: MaterialResponse) -> str:
     """Lines of C that fill the unknowns of the law.
 
     Of large strains: the Cholesky factor of C = 1 + 2 E, which is F up to a rotation.
@@ -68,7 +74,7 @@ def _deformation(r: Response) -> str:
 """
 
 
-def deck(r: Response, settings: Sequence[float], count: int = 2) -> str:
+def deck(r: MaterialResponse, settings: Sequence[float], count: int = 2) -> str:
     """A block of `count` elements a direction, stretched and twisted."""
     nodes, elements, constraints = shared.block(count)
     step = "*STEP" if r.measure is Measure.SMALL else "*STEP, NLGEOM"

@@ -113,20 +113,20 @@ def solves(interface: ElementInterface) -> bool:
 
 def lists(interface: ElementInterface, task: str) -> tuple[list[Array], list[Array]]:
     """Inputs and results of a function."""
-    given = inputs(interface)
+    arguments = inputs(interface)
     if task != "commit":
-        return [*given, *direction(interface, task)], results(interface, task)
-    return results(interface, Task.FIELDS), [a for a in given if a.name == "data"]
+        return [*arguments, *direction(interface, task)], results(interface, task)
+    return results(interface, Task.FIELDS), [a for a in arguments if a.name == "data"]
 
 
 def expected(interface: ElementInterface) -> list[Array]:
     """Arrays of values.txt behind the arguments, in its order."""
-    wanted = {a.name: a for t in interface.tasks for a in results(interface, t)}
-    found = [a for k in ("energy", "residual", "tangent", "fields") if (a := wanted.get(k))]
+    by_name = {a.name: a for t in interface.tasks for a in results(interface, t)}
+    outputs = [a for k in ("energy", "residual", "tangent", "fields") if (a := by_name.get(k))]
     if c_interface.commits(interface):
         shape = next(a.shape for a in inputs(interface) if a.name == "data")
-        found.append(Array("renewed", shape, "data after a step"))
-    return found
+        outputs.append(Array("renewed", shape, "data after a step"))
+    return outputs
 
 
 def array_rows(interface: ElementInterface) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from softehl.codegen import pipeline
 from softehl.codegen.emit.device import header
 from softehl.codegen.emit.device.kernels import DeviceKernels
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.hosts import c_interface
 from softehl.codegen.hosts.c_library import LIMIT
 from softehl.codegen.hosts.element_interface import ElementInterface
@@ -23,7 +23,7 @@ from softehl.device_arrays import by_blocks, numbered, sparse_pattern
 Fields = tuple[tuple[str, ...], tuple[int, ...]]
 
 
-def folder(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def folder(interface: ElementInterface, states: Sequence[EvaluationState]) -> dict[str, str]:
     """Every file of the folder.  Raises `TargetError` for a page that a device cannot run."""
     kernels = pipeline.device_kernels(interface.definition)
     kernel = pipeline.compile_model(interface.definition)

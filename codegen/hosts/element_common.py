@@ -91,8 +91,8 @@ def arguments(interface: ElementInterface, syntax: Syntax = IN_C) -> Iterable[st
     ):
         for k, source in enumerate(sources):
             end = "\n" if syntax is IN_FORTRAN else ";\n"
-            place = entry.format(k + syntax.base)
-            yield f"    {place} = {_argument(interface, source, syntax)}{end}"
+            target = entry.format(k + syntax.base)
+            yield f"    {target} = {_argument(interface, source, syntax)}{end}"
 
 
 def _argument(interface: ElementInterface, source: Source, syntax: Syntax) -> str:
@@ -101,8 +101,8 @@ def _argument(interface: ElementInterface, source: Source, syntax: Syntax) -> st
             return syntax.props.format(index + syntax.base)
         case TimeStepValue(what):
             return syntax.dtime if what == "dt" else syntax.rate
-        case PreviousValue(place, is_rate):
-            old = syntax.old.format(interface.by_node().index(place) + syntax.base)
+        case PreviousValue(dof, is_rate):
+            old = syntax.old.format(interface.by_node().index(dof) + syntax.base)
             return f"-({old}) * {syntax.rate}" if is_rate else old
 
 

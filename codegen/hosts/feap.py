@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softehl.codegen.abi import Task
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, column_major, patch_mesh
 from softehl.codegen.hosts.abaqus_deck import degrees
@@ -35,7 +35,7 @@ HEADERS = {
 """Members of FEAP's common blocks that the element uses."""
 
 
-def element(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def element(interface: ElementInterface, states: Sequence[EvaluationState]) -> dict[str, str]:
     """Every file of a user element."""
     require(interface, "feap")
     column_major.require_name(f"{interface.name}_fields_feap", "feap")
@@ -68,13 +68,13 @@ FEAP = Host(element=element)
 def _substitutions(interface: ElementInterface) -> dict[str, object]:
     d = interface.definition
     numbers = degrees(interface, scalar=1 + len(interface.vector))
-    place = {dof: k for k, f in enumerate(interface.nodal) for dof in f.dofs}
+    position = {dof: k for k, f in enumerate(interface.nodal) for dof in f.dofs}
     order = interface.by_node()
-    freedom = [numbers[place[i]] for i in order]
+    freedom = [numbers[position[i]] for i in order]
     at_node = [1 + (d.dof_nodes[i][1] or 0) for i in order]
     named = len(interface.nodal)
-    known = set(zip(at_node, freedom, strict=True))
-    idle = [int((n + 1, c + 1) not in known) for n in range(d.nodes) for c in range(named)]
+    pairs = set(zip(at_node, freedom, strict=True))
+    idle = [int((n + 1, c + 1) not in pairs) for n in range(d.nodes) for c in range(named)]
     return {
         **notes(interface, numbers, "UTANgent instead of TANGent"),
         "lower": interface.name.lower(),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softehl.codegen.abi import TargetError, Task
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, column_major, patch_mesh
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
@@ -18,7 +18,7 @@ from softehl.codegen.hosts.test_states import Sample, samples
 from softehl.codegen.verify.kernel_batch import parameters_of
 
 
-def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def module(interface: ElementInterface, states: Sequence[EvaluationState]) -> dict[str, str]:
     """Every file of target `fortran`."""
     _check_names(interface)
     texts, kernel = c_interface.files(interface)

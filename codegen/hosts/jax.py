@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from softehl.codegen.abi import ARRAY_ENTRIES, Task
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
 from softehl.codegen.hosts.element_interface import ElementInterface
@@ -17,7 +17,7 @@ from softehl.codegen.hosts.test_states import Sample, samples
 from softehl.codegen.verify.kernel_batch import parameters_of
 
 
-def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def module(interface: ElementInterface, states: Sequence[EvaluationState]) -> dict[str, str]:
     """Every file of a module for JAX."""
     interface.require("jax", Task.RESIDUAL, Task.TANGENT)
     interface = with_derivatives(interface)

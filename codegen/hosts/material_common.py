@@ -16,7 +16,7 @@ from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.abaqus_deck import named
 from softehl.codegen.hosts.element_common import arguments, conditions
 from softehl.codegen.hosts.element_interface import ElementInterface
-from softehl.codegen.hosts.material_response import Measure, Response, solid
+from softehl.codegen.hosts.material_response import MaterialResponse, Measure, solid
 from softehl.codegen.hosts.registry import StatesOf
 from softehl.codegen.hosts.test_states import samples
 from softehl.codegen.pipeline import compile_model
@@ -25,7 +25,7 @@ PULL, TWIST = 0.2, 0.3
 """Stretch of the block in a deck, and its twist by shear."""
 
 
-def substitutions(r: Response, element: str) -> dict[str, object]:
+def substitutions(r: MaterialResponse, element: str) -> dict[str, object]:
     """Values for the templates of a host; element: C expression of the element's number."""
     interface = r.interface
     outputs = _outputs(r)
@@ -53,7 +53,7 @@ def substitutions(r: Response, element: str) -> dict[str, object]:
     }
 
 
-def _outputs(r: Response) -> list[str]:
+def _outputs(r: MaterialResponse) -> list[str]:
     """Fields that the law gives, without its history."""
     d = r.definition
     return [name for name, _ in d.fields[r.first_law_field : len(d.fields) - len(d.history)]]
@@ -66,13 +66,13 @@ def _history(interface: ElementInterface) -> Iterable[str]:
         yield f"    after[{k}] = {value};\n"
 
 
-def modulus_table(r: Response, order: Sequence[int] = range(6)) -> str:
+def modulus_table(r: MaterialResponse, order: Sequence[int] = range(6)) -> str:
     """Rows of a C table: field of each modulus; order: our component for each of the host's."""
     rows = [", ".join(str(r.modulus(i, j)) for j in order) for i in order]
     return "\n".join(f"    {{{row}}}," for row in rows)
 
 
-def energy_density(r: Response) -> str:
+def energy_density(r: MaterialResponse) -> str:
     """C expression of the energy per current volume."""
     if r.measure is Measure.SMALL:
         return "fields[0]"
@@ -88,12 +88,12 @@ def cauchy_element(call: str, host_name: str, values: Mapping[str, object]) -> s
     return c_interface.filled(text, {**values, "host_name": host_name})
 
 
-def depvar(r: Response) -> list[str]:
+def depvar(r: MaterialResponse) -> list[str]:
     """Lines of a deck with the number of state variables."""
     return ["*DEPVAR", str(n)] if (n := substitutions(r, "")["depvar"]) else []
 
 
-def tests(r: Response, states: StatesOf) -> tuple[dict[str, str], list[float]]:
+def tests(r: MaterialResponse, states: StatesOf) -> tuple[dict[str, str], list[float]]:
     """Files of the small host, and values of the constants."""
     d = solid(r.law)
     interface = ElementInterface(
@@ -138,6 +138,6 @@ def block(count: int = 2) -> tuple[list[str], list[str], list[str]]:
     return nodes, elements, constraints
 
 
-def constants(r: Response, values: Sequence[float]) -> list[str]:
+def constants(r: MaterialResponse, values: Sequence[float]) -> list[str]:
     """Lines of *USER MATERIAL: names, then values; those of `m.example` where the law has them."""
     return named(r.parameters, values, r.written.example)

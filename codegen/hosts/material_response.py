@@ -17,7 +17,7 @@ import sympy as sp
 
 from softehl.codegen.abi import TargetError, Task
 from softehl.codegen.elements import cells, quadrature
-from softehl.codegen.graph.evaluation import State, Walk
+from softehl.codegen.graph.evaluation import EvaluationState, Walk
 from softehl.codegen.graph.graph import Node
 from softehl.codegen.graph.traversal import substitute
 from softehl.codegen.hosts.element_interface import ElementInterface
@@ -41,7 +41,7 @@ class Measure(StrEnum):
 
 
 @dataclass(frozen=True)
-class Response:
+class MaterialResponse:
     """A material in one measure.
 
     Its unknowns are F row by row, or six small strains; its fields are the energy (zero for a law
@@ -88,7 +88,7 @@ def _written(law: Law, F: Any) -> tuple[Model, Material]:
     return m, law.on(m, F)
 
 
-def response(law: Law, measure: Measure) -> Response:
+def response(law: Law, measure: Measure) -> MaterialResponse:
     """Return the law in a measure of large strains; small-strain laws stay in theirs."""
     m = Model(law.name, nodes=1, rule=quadrature.point_rule(), doc=law.doc)
     if is_small_strain(law):
@@ -114,7 +114,7 @@ def response(law: Law, measure: Measure) -> Response:
     m.example(F11=1, F22=1, F33=1, **{str(s): 0 for s in steps})
     _close(m, material, list(P), list(F))
     d = _ordered(m.finish())
-    return Response(law, measure, _at_rest(d), d, material.W is not None)
+    return MaterialResponse(law, measure, _at_rest(d), d, material.W is not None)
 
 
 def _tensor(strains: Sequence[Any]) -> Any:
@@ -170,7 +170,7 @@ def _close(m: Model, law: Material, P: Sequence[Any], F: Sequence[Any]) -> None:
         m.weak_form(list(zip(P, F, strict=True)))
 
 
-def _small(law: Law, m: Model) -> Response:
+def _small(law: Law, m: Model) -> MaterialResponse:
     strains = [m.unknown(f"e{i + 1}{j + 1}") for i, j in VOIGT]
     material = law.on(m, sp.eye(3) + _tensor(strains))
     if material.W is not None:
@@ -183,7 +183,7 @@ def _small(law: Law, m: Model) -> Response:
         m.fields(**{f"skew{i}{j}": material.P[i, j] - material.P[j, i] for i, j in VOIGT[3:]})
     _close(m, material, stress, strains)
     d = _ordered(m.finish())
-    return Response(law, Measure.SMALL, _at_rest(d), d, material.W is not None)
+    return MaterialResponse(law, Measure.SMALL, _at_rest(d), d, material.W is not None)
 
 
 def _rounding(d: Definition) -> Any:
@@ -191,7 +191,7 @@ def _rounding(d: Definition) -> Any:
     return mpmath.mpf(10) ** (-12 if functions_of_user(d) else -20)
 
 
-def checked(r: Response, states: Sequence[State]) -> Response:
+def checked(r: MaterialResponse, states: Sequence[EvaluationState]) -> MaterialResponse:
     """The response without its test: raises `TargetError` where its stress is not symmetric."""
     d = r.definition
     skew = [n for name, n in d.fields if re.fullmatch(r"skew\d\d", name)]
@@ -209,7 +209,7 @@ def checked(r: Response, states: Sequence[State]) -> Response:
     return replace(r, definition=replace(d, fields=fields))
 
 
-def packed(r: Response, states: Sequence[State]) -> Response:
+def packed(r: MaterialResponse, states: Sequence[EvaluationState]) -> MaterialResponse:
     """The response of a law that gives a stress with 21 moduli: `TargetError` where 36 differ."""
     d = r.definition
     with mpmath.workdps(30):
@@ -273,7 +273,7 @@ def solid(law: Law, name: str = "tet4") -> Definition:
 
 
 def at_one_point(
-    write: Callable[[ElementInterface, Sequence[State]], Files],
+    write: Callable[[ElementInterface, Sequence[EvaluationState]], Files],
 ) -> Callable[[Law, StatesOf], Files]:
     """Writer for materials from one for elements: a model of one point, with stress and modulus."""
 

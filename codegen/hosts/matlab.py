@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softehl.codegen.abi import Task
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, column_major, patch_mesh
 from softehl.codegen.hosts.c_library import DIFFERENCE, LIMIT
@@ -17,7 +17,7 @@ from softehl.codegen.hosts.registry import Host
 from softehl.codegen.hosts.test_states import Sample, samples
 
 
-def mex(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def mex(interface: ElementInterface, states: Sequence[EvaluationState]) -> dict[str, str]:
     """Every file of target `matlab`."""
     column_major.require_name(f"{interface.name}_mex", "matlab")
     texts, kernel = c_interface.files(interface)

@@ -10,7 +10,7 @@ from typing import Any
 from softehl.codegen.abi import TargetError, Task
 from softehl.codegen.elements import cells
 from softehl.codegen.elements.element import Element
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import c_interface, patch_mesh
 from softehl.codegen.hosts.element_interface import ElementInterface, UserInput
@@ -36,7 +36,7 @@ MESHES = {
 }
 
 
-def module(interface: ElementInterface, states: Sequence[State]) -> dict[str, str]:
+def module(interface: ElementInterface, states: Sequence[EvaluationState]) -> dict[str, str]:
     """Every file of the integrator."""
     kind = _kind(interface)
     texts, kernel = c_interface.files(interface, single=True)

@@ -69,11 +69,11 @@ def _pyramids() -> Iterator[Map]:
 
         def affine(p: Place, axis: int = axis, end: int = end) -> Place:
             x, y, height = p if end == 0 else (p[1], p[0], p[2])
-            place = [half * (1 + x), half * (1 + y)]
-            place.insert(axis, half * height if end == 0 else 1 - half * height)
+            point = [half * (1 + x), half * (1 + y)]
+            point.insert(axis, half * height if end == 0 else 1 - half * height)
             if axis == 1:
-                place[0], place[2] = place[2], place[0]
-            return tuple(place)
+                point[0], point[2] = point[2], point[0]
+            return tuple(point)
 
         yield affine
 

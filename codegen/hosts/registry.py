@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from softehl.codegen.abi import TargetError
 
 if TYPE_CHECKING:
-    from softehl.codegen.graph.evaluation import State
+    from softehl.codegen.graph.evaluation import EvaluationState
     from softehl.codegen.hosts.element_interface import ElementInterface
     from softehl.codegen.language.definition import Definition
     from softehl.codegen.language.material import Law
@@ -42,7 +42,7 @@ BUILT_IN = {
 
 Files: TypeAlias = dict[str, str]
 """Text of each file of a folder, by its name."""
-StatesOf: TypeAlias = "Callable[[Definition], Sequence[State]]"
+StatesOf: TypeAlias = "Callable[[Definition], Sequence[EvaluationState]]"
 """States at which a model has values, for the tests of a folder."""
 
 
@@ -54,7 +54,7 @@ class Host:
     hands over run-time arrays (`Model.table`, `Model.network`).
     """
 
-    element: Callable[[ElementInterface, Sequence[State]], Files] | None = None
+    element: Callable[[ElementInterface, Sequence[EvaluationState]], Files] | None = None
     material: Callable[[Law, StatesOf], Files] | None = None
     arrays: bool = False
 

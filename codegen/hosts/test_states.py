@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import mpmath
 
 from softehl.codegen.abi import Task
-from softehl.codegen.derive.output_entries import Entry
+from softehl.codegen.derive.output_entries import OutputEntry
 from softehl.codegen.derive.task_outputs import outputs
-from softehl.codegen.graph.evaluation import State, Walk
-from softehl.codegen.graph.tensor_functions import Kernel
+from softehl.codegen.graph.evaluation import EvaluationState, Walk
+from softehl.codegen.graph.tensor_functions import MatrixKernel
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.pipeline import KernelSource
@@ -31,7 +31,7 @@ class Sample:
     tangent: row by row. fields: point by point.
     """
 
-    state: State
+    state: EvaluationState
     energy: list[float]
     residual: list[float]
     tangent: list[float]
@@ -54,7 +54,7 @@ def renewed(interface: ElementInterface, s: Sample) -> list[float]:
     return [v for row in rows for v in row]
 
 
-def sample(interface: ElementInterface, kernel: KernelSource, state: State) -> Sample:
+def sample(interface: ElementInterface, kernel: KernelSource, state: EvaluationState) -> Sample:
     """The values of all tasks at one state."""
     # where the loop over the points is written out, their data stand behind those of the element
     flat = [v for row in (state.data, *state.point_data) for v in row]
@@ -81,7 +81,7 @@ def sample(interface: ElementInterface, kernel: KernelSource, state: State) -> S
     )
 
 
-def _entries(interface: ElementInterface, kernel: KernelSource, task: str) -> list[Entry]:
+def _entries(interface: ElementInterface, kernel: KernelSource, task: str) -> list[OutputEntry]:
     """Outputs of the whole element, also of a kernel that is made of functions of a point.
 
     Functions of tensors are printed as routines without a value of their own: their outputs are
@@ -92,13 +92,13 @@ def _entries(interface: ElementInterface, kernel: KernelSource, task: str) -> li
     function = kernel.functions[task]
     printed = function.best.entries
     below = reachable([x.node for x in printed])
-    if function.printer == "points" or any(isinstance(n.payload, Kernel) for n in below):
+    if function.printer == "points" or any(isinstance(n.payload, MatrixKernel) for n in below):
         return outputs(interface.definition, task)
     return printed
 
 
 def samples(
-    interface: ElementInterface, kernel: KernelSource, states: Sequence[State]
+    interface: ElementInterface, kernel: KernelSource, states: Sequence[EvaluationState]
 ) -> list[Sample]:
     """The values at several states."""
     return [sample(interface, kernel, s) for s in states]

@@ -9,7 +9,7 @@ from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.external_function import ExternalFunction
 from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.graph.routines import external_functions
-from softehl.codegen.graph.run_time_arrays import RunTimeArray
+from softehl.codegen.graph.run_time_arrays import ArraySymbol
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.sympy_tape import SympyTape
 from softehl.function_address import FunctionAddress
@@ -70,7 +70,7 @@ class Component:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class PointQuantity:
     """Value of a component at the point (axis None), or its derivative along an axis."""
 
     component: Component
@@ -88,14 +88,14 @@ class PointForm:
     """
 
     definition: Definition
-    unknowns: tuple[Quantity, ...]
-    all: tuple[Quantity, ...]
-    data: Mapping[int, Quantity]
+    unknowns: tuple[PointQuantity, ...]
+    all: tuple[PointQuantity, ...]
+    data: Mapping[int, PointQuantity]
     axisymmetric: bool
     centroid: Mapping[int, Node] = field(default_factory=dict)
 
     @property
-    def cell_quantities(self) -> dict[int, Quantity]:
+    def cell_quantities(self) -> dict[int, PointQuantity]:
         """The unknowns that are fields at this point, with their numbers in `unknowns`."""
         others = {self.all[k] for k in self.centroid}
         return {k: q for k, q in enumerate(self.unknowns) if q not in others}
@@ -237,7 +237,7 @@ class Definition:
     """Whether a parameter of the page is data of elements or points instead."""
     point: PointForm | None = field(default=None, compare=False)
     """The same model at a point, from which the kernel of the whole element can be made as well."""
-    arrays: tuple[RunTimeArray, ...] = ()
+    arrays: tuple[ArraySymbol, ...] = ()
     """Arrays of any length, the same for all elements of a call."""
     term_groups: tuple[tuple[str, ...], ...] = ()
     """Arrays of terms that stand in one sum, and so have equal lengths."""
@@ -354,13 +354,13 @@ class Definition:
 
     def _value(self, name: str) -> Node:
         """Value that the page names.  Raises ModelError."""
-        known = {s.name: s.value for s in self.statements if s.name}
-        prefixed = [k for k in known if k.endswith(f"_{name}")]
+        values = {s.name: s.value for s in self.statements if s.name}
+        prefixed = [k for k in values if k.endswith(f"_{name}")]
         of_material = [k for k in prefixed if self.name.startswith(k[: -len(name)])]
-        if name not in known and len(of_material) != 1:
-            shown = [k for k in known if not k.startswith(("parent_", "shape_"))]
-            raise ModelError(f"{self.name} has no value {name!r}; it names {', '.join(shown)}", "")
-        return known[name if name in known else of_material[0]]
+        if name not in values and len(of_material) != 1:
+            names = [k for k in values if not k.startswith(("parent_", "shape_"))]
+            raise ModelError(f"{self.name} has no value {name!r}; it names {', '.join(names)}", "")
+        return values[name if name in values else of_material[0]]
 
     @property
     def page_point_data(self) -> int:
@@ -370,6 +370,6 @@ class Definition:
 
 def functions_of_user(d: Definition) -> dict[Node, ExternalFunction]:
     """Calls of C functions of the user in a model."""
-    given = [n for pairs in d.prescribed.values() for n in pairs.values()]
-    given += d.term_updates
-    return external_functions([d.potential, *(n for _, n in d.fields), *given])
+    nodes = [n for pairs in d.prescribed.values() for n in pairs.values()]
+    nodes += d.term_updates
+    return external_functions([d.potential, *(n for _, n in d.fields), *nodes])

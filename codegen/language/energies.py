@@ -19,7 +19,7 @@ from softehl.codegen.language.model import Model
 
 
 @dataclass(frozen=True)
-class Term:
+class EnergyTerm:
     """Energy of a model as a function of the variables `of`."""
 
     of: Literal["invariants", "stretches"]
@@ -38,10 +38,10 @@ class Energy:
     value: Callable[..., Any]
     of: Literal["invariants", "stretches"] = "invariants"
 
-    def declared(self, m: Model) -> Term:
+    def declared(self, m: Model) -> EnergyTerm:
         """The term in a model, whose parameters become parameters of `m`."""
         symbols = m.parameters(**self.parameters)
-        return Term(self.of, lambda *variables: self.value(*variables, *symbols))
+        return EnergyTerm(self.of, lambda *variables: self.value(*variables, *symbols))
 
     def parameter_symbols(self) -> list[sp.Symbol]:
         """The symbols that `declared` makes of its parameters."""

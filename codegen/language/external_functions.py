@@ -68,8 +68,8 @@ class Prototype:
 
 def _count(name: str, outputs: Any) -> int:
     shape = outputs if isinstance(outputs, tuple) else (outputs,)
-    whole = all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in shape)
-    if not whole or len(shape) not in (1, 2):
+    are_sizes = all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in shape)
+    if not are_sizes or len(shape) not in (1, 2):
         raise ModelError(
             f"{name}: outputs = {outputs!r}, must be a number of values, or (rows, columns) of a "
             "matrix"
@@ -107,10 +107,10 @@ def _included(path: Path, seen: set[Path]) -> str:
     seen.add(path.resolve())
     text = path.read_text(encoding="utf-8")
 
-    def replaced(found: re.Match[str]) -> str:
-        inner = path.parent / found[1]
+    def replaced(match: re.Match[str]) -> str:
+        inner = path.parent / match[1]
         if not inner.is_file():
-            return found[0]
+            return match[0]
         return "" if inner.resolve() in seen else _included(inner, seen)
 
     return _INCLUDE.sub(replaced, text)

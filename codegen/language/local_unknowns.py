@@ -10,7 +10,7 @@ import sympy as sp
 
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.graph.evaluation import symmetric
-from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.graph.graph import Graph, InputEntry, Node, Op
 from softehl.codegen.graph.routines import (
     Control,
     External,
@@ -104,7 +104,7 @@ def written_out(
             "unknowns; wrap it in integral(...) too"
         )
     below = reachable([n for n in inside if n.op is Op.SUM])
-    arrays = {n.payload.array for n in below if isinstance(n.payload, Input) and n.varying}
+    arrays = {n.payload.array for n in below if isinstance(n.payload, InputEntry) and n.varying}
     if arrays - {"rule"} or any(n in prescribed for n in below):
         raise ModelError(
             f"{name}: an integral of local unknowns may hold no point data, no interpolated "

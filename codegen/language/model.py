@@ -640,9 +640,9 @@ class Model(ModelBuilder):
         groups = self._arguments.term_groups
         return run_time_terms.each(self._symbols, groups, arrays_and_function)
 
-    def _reduced(self, kind: Kind, given: Sequence[Any]) -> Any:
+    def _reduced(self, kind: Kind, arguments: Sequence[Any]) -> Any:
         groups = self._arguments.term_groups
-        return run_time_terms.reduced(self._symbols, groups, kind, given)
+        return run_time_terms.reduced(self._symbols, groups, kind, arguments)
 
     def product(self, *arrays_and_function: Any) -> Any:
         """Return the product of a function of the entries of arrays over their terms; as `sum`.

@@ -22,8 +22,8 @@ from softehl.codegen.abi import Task
 from softehl.codegen.elements import cells
 from softehl.codegen.elements.quadrature import QuadratureRule
 from softehl.codegen.graph.differentiation import gradient
-from softehl.codegen.graph.graph import Input, Node, Op
-from softehl.codegen.graph.run_time_arrays import RunTimeArray
+from softehl.codegen.graph.graph import InputEntry, Node, Op
+from softehl.codegen.graph.run_time_arrays import ArraySymbol
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language import local_unknowns
 from softehl.codegen.language.definition import Argument, Condition, Definition, TermHistory
@@ -82,7 +82,7 @@ class Arguments:
         self.lists: dict[str, list[Argument]] = {"parameters": [], "data": [], "point data": []}
         self.conditions: list[Condition] = []
         self.example: dict[str, float] = {}
-        self.arrays: list[RunTimeArray] = []
+        self.arrays: list[ArraySymbol] = []
         self.term_history: list[TermHistory] = []
         self.term_groups: dict[tuple[str, ...], None] = {}
         self.varying = dict(_VARYING.get())
@@ -165,7 +165,7 @@ class Arguments:
             self._input(name, array, start + k, varying=varying) for k, name in enumerate(meanings)
         ]
 
-    def array(self, record: RunTimeArray) -> tuple[int, sp.Symbol]:
+    def array(self, record: ArraySymbol) -> tuple[int, sp.Symbol]:
         """Number of a run-time array, declared once, and the amount of its variation."""
         named = [k for k, a in enumerate(self.arrays) if a.name == record.name]
         number = named[0] if named else len(self.arrays)
@@ -181,8 +181,8 @@ class Arguments:
 
     def point_array(self, record: TermHistory, *, varying: bool) -> tuple[int, sp.Symbol]:
         """Number of a history with one number for each term, and the amount of its variation."""
-        taken = [*(a.name for a in self.arrays), *(h.name for h in self.term_history)]
-        if record.name in taken:
+        used = [*(a.name for a in self.arrays), *(h.name for h in self.term_history)]
+        if record.name in used:
             raise ModelError(f"the name {record.name} is used twice for arrays: rename one")
         self.term_history.append(record)
         number = len(self.term_history) - 1
@@ -266,7 +266,7 @@ class Arguments:
         unused: advice on unknowns.
         """
         for name, (n, where) in self._declared.items():
-            unknown = isinstance(n.payload, Input) and n.payload.array == "dofs"
+            unknown = isinstance(n.payload, InputEntry) and n.payload.array == "dofs"
             if n not in (equations if unknown else used):
                 what, advice = ("unknown", unused) if unknown else ("argument", "leave it out")
                 name = name.removeprefix("variation of ")
@@ -539,7 +539,7 @@ class Outputs:
         """Add derivatives of the residual by parameters, data or coordinates."""
         nodes = [(str(s), self._symbols.lower(s)) for s in symbols]
         for name, n in nodes:
-            source = n.payload.array if isinstance(n.payload, Input) else ""
+            source = n.payload.array if isinstance(n.payload, InputEntry) else ""
             if source not in ("parameters", "data", "coordinates"):
                 raise ModelError(f"{name} is no parameter, datum or coordinate to derive by")
         self.derivatives += [pair for pair in nodes if pair not in self.derivatives]

@@ -62,8 +62,8 @@ class PairModel(Fields):
         """Distance of the sides along the normal [mm]; negative where they overlap."""
         self._of_pairs = True
         if "gap" not in self._named:
-            apart = sp.Matrix(self._vector("apart"))
-            self._named["gap"] = self.define("gap", apart.dot(self.normal))
+            distance = sp.Matrix(self._vector("apart"))
+            self._named["gap"] = self.define("gap", distance.dot(self.normal))
         return self._named["gap"]
 
     @property

@@ -14,9 +14,9 @@ import sympy as sp
 from softehl.codegen.elements.element import Element
 from softehl.codegen.elements.quadrature import point_rule
 from softehl.codegen.graph.differentiation import gradient
-from softehl.codegen.graph.graph import Input, Node, Op
+from softehl.codegen.graph.graph import InputEntry, Node, Op
 from softehl.codegen.graph.traversal import reachable
-from softehl.codegen.language.definition import Component, PointForm, Quantity
+from softehl.codegen.language.definition import Component, PointForm, PointQuantity
 from softehl.codegen.language.errors import NeedsElementError
 from softehl.codegen.language.fields import AXISYMMETRIC, Fields, FieldTrace
 from softehl.codegen.language.flatten import Entries
@@ -30,8 +30,8 @@ class PointModel(Fields):
     def __init__(self, name: str, cell: Element, geometry: str, doc: str) -> None:
         super().__init__(name, cell, geometry, 1, point_rule(), doc)
         self._X = [x[0] for x in self.coordinates(*"XYZ"[: cell.dimension])]
-        self._quantities: list[Quantity] = []
-        self._data_at_point: dict[int, Quantity] = {}
+        self._quantities: list[PointQuantity] = []
+        self._data_at_point: dict[int, PointQuantity] = {}
         self._centroid: dict[int, Node] = {}
 
     def form(self) -> PointForm:
@@ -62,7 +62,7 @@ class PointModel(Fields):
         for v in entries.values:
             node = self._symbols.lower(v)
             met = reachable([node])
-            inputs = [n.payload for n in met if isinstance(n.payload, Input)]
+            inputs = [n.payload for n in met if isinstance(n.payload, InputEntry)]
             allowed = all(
                 i.array == "coordinates" or (i.array == "dofs" and i.index not in self._centroid)
                 for i in inputs
@@ -71,7 +71,7 @@ class PointModel(Fields):
                 raise NeedsElementError(f"m.centroid({value})")
             label = f"centroid_{len(self._centroid)}"
             self._centroid[len(self._quantities)] = node
-            self._quantities.append(Quantity(Component(label, 0), None))
+            self._quantities.append(PointQuantity(Component(label, 0), None))
             named.append(self.unknown(label))
         return entries.arrange(named)
 
@@ -82,7 +82,7 @@ class PointModel(Fields):
                 component.name,
                 *(f"grad_{component.name}_{k}" for k in range(self.dimension)),
             ]
-            quantities = [Quantity(component, k) for k in (None, *range(self.dimension))]
+            quantities = [PointQuantity(component, k) for k in (None, *range(self.dimension))]
             if component.is_data:
                 start = len(self._arguments.lists["data"])
                 symbols = self.data(**dict.fromkeys(labels, "at the point"))
@@ -111,5 +111,5 @@ class PointModel(Fields):
 
 
 def _index(n: Node) -> int:
-    assert isinstance(n.payload, Input)
+    assert isinstance(n.payload, InputEntry)
     return n.payload.index

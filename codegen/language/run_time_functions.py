@@ -11,15 +11,15 @@ from softehl.codegen.graph import run_time_arrays
 from softehl.codegen.graph.run_time_arrays import (
     ACTIVATIONS,
     ArrayRoutine,
+    ArraySymbol,
     NetworkLayout,
-    RunTimeArray,
     TableLayout,
 )
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.sympy_lowering import Symbols
 from softehl.codegen.language.sympy_tape import OfArray
 
-Declare = Callable[[RunTimeArray], tuple[int, sp.Symbol]]
+Declare = Callable[[ArraySymbol], tuple[int, sp.Symbol]]
 """Declares an array: its number, and the symbol of the amount of its variation."""
 
 INTERPOLATIONS = ("linear", "pchip", "spline")
@@ -44,7 +44,7 @@ def table(
         if value not in allowed:
             raise ModelError(f"table {name}: {what} = {value!r}; allowed: {', '.join(allowed)}")
     layout = TableLayout(interpolation, outside)
-    record = RunTimeArray(name, " ".join(meaning.split()) or "curve", layout)
+    record = ArraySymbol(name, " ".join(meaning.split()) or "curve", layout)
     return _value(symbols, declare, record, [argument], run_time_arrays.table)
 
 
@@ -83,14 +83,14 @@ def network(
     if not count:
         raise ModelError(f"network {name}: it has no inputs")
     layout = NetworkLayout(count, tuple(widths), activation, bool(convex), bool(monotone))
-    record = RunTimeArray(name, " ".join(meaning.split()) or "weights of a network", layout)
+    record = ArraySymbol(name, " ".join(meaning.split()) or "weights of a network", layout)
     return _value(symbols, declare, record, list(inputs), run_time_arrays.network)
 
 
 def _value(
     symbols: Symbols,
     declare: Declare,
-    record: RunTimeArray,
+    record: ArraySymbol,
     args: Sequence[Any],
     routine: Callable[..., ArrayRoutine],
 ) -> sp.Symbol:

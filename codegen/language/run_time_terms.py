@@ -10,7 +10,7 @@ import sympy as sp
 
 from softehl.codegen.graph.graph import Node, Op
 from softehl.codegen.graph.routines import LocalisedValues, localise
-from softehl.codegen.graph.run_time_arrays import RunTimeArray
+from softehl.codegen.graph.run_time_arrays import ArraySymbol
 from softehl.codegen.graph.term_reductions import Kind, TermsLayout, reduction
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import TermHistory
@@ -56,7 +56,7 @@ class TermArray:
 
 def array(
     symbols: Symbols,
-    declare: Callable[[RunTimeArray], tuple[int, sp.Symbol]],
+    declare: Callable[[ArraySymbol], tuple[int, sp.Symbol]],
     name: str,
     meaning: str,
 ) -> TermArray:
@@ -65,7 +65,7 @@ def array(
         raise ModelError(
             f"the name {name} is used twice in model {symbols.model}: rename the array"
         )
-    record = RunTimeArray(
+    record = ArraySymbol(
         name, " ".join(meaning.split()) or "one number for each term", TermsLayout()
     )
     return TermArray(name, *declare(record))
@@ -78,7 +78,7 @@ class NewTerms:
     Made by `Model.each`, for `Model.history`.
     """
 
-    loop: Loop
+    loop: TermLoop
     index: int
 
     def __repr__(self) -> str:
@@ -96,7 +96,7 @@ class NewTerms:
 
 
 @dataclass(frozen=True, eq=False)
-class Loop:
+class TermLoop:
     """A function of the entries of arrays, as a page writes it.
 
     label: its name. entries: symbols of the entries. written: what the function returns.
@@ -109,7 +109,7 @@ class Loop:
     system: LocalisedValues
 
     @staticmethod
-    def of(symbols: Symbols, groups: Groups, kind: Kind, arguments: Sequence[Any]) -> Loop:
+    def of(symbols: Symbols, groups: Groups, kind: Kind, arguments: Sequence[Any]) -> TermLoop:
         """The function at the end of some arguments.  groups: see `reduced`."""
         call = f"m.{kind}(g, tau, lambda g, tau: ...)"
         if len(arguments) < 2 or not callable(arguments[-1]):
@@ -132,13 +132,13 @@ class Loop:
         values = [symbols.lower(e) for e in written.values]
         _check(kind, values)
         system = localise(symbols.graph, values, local)
-        return Loop(label, arrays, list(entries.values), written, system)
+        return TermLoop(label, arrays, list(entries.values), written, system)
 
     def run(
-        self, symbols: Symbols, kind: Kind, chosen: Sequence[int], targets: tuple[int, ...] = ()
+        self, symbols: Symbols, kind: Kind, selected: Sequence[int], targets: tuple[int, ...] = ()
     ) -> list[Node]:
         """Results of a reduction of some of the returned values."""
-        terms = [self.system.values[k] for k in chosen]
+        terms = [self.system.values[k] for k in selected]
         numbers = [a.number for a in self.arrays]
         count = len(self.system.external)
         routine = reduction(symbols.graph, self.label, kind, numbers, terms, count, targets=targets)
@@ -148,10 +148,10 @@ class Loop:
         return [symbols.lower(a.amount) for a in self.arrays]
 
     def note(
-        self, symbols: Symbols, kind: Kind, chosen: Sequence[int], names: Sequence[Any]
+        self, symbols: Symbols, kind: Kind, selected: Sequence[int], names: Sequence[Any]
     ) -> None:
         """Note names of some of the returned values in the record of the page."""
-        written = [self.written.values[k] for k in chosen]
+        written = [self.written.values[k] for k in selected]
         amounts = [a.amount for a in self.arrays]
         symbols.record.reduction(str(kind), self.entries, amounts, written, names)
 
@@ -182,7 +182,7 @@ def reduced(symbols: Symbols, groups: Groups, kind: Kind, arguments: Sequence[An
 
     groups: names of arrays of equal lengths; those of this call are added.
     """
-    loop = Loop.of(symbols, groups, kind, arguments)
+    loop = TermLoop.of(symbols, groups, kind, arguments)
     every = range(len(loop.written.values))
     nodes = loop.run(symbols, kind, every)
     below = [*loop.written.values, *(a.amount for a in loop.arrays)]
@@ -193,7 +193,7 @@ def reduced(symbols: Symbols, groups: Groups, kind: Kind, arguments: Sequence[An
 
 def each(symbols: Symbols, groups: Groups, arguments: Sequence[Any]) -> Any:
     """New history for each term; see `Model.each`."""
-    loop = Loop.of(symbols, groups, Kind.EACH, arguments)
+    loop = TermLoop.of(symbols, groups, Kind.EACH, arguments)
     new = [NewTerms(loop, k) for k in range(len(loop.written.values))]
     scalar = list(loop.written.suffixes) == [""]
     return new[0] if scalar else new
@@ -204,7 +204,7 @@ def updates(
 ) -> dict[str, Node]:
     """New values of history of terms; those of one call of `each` are computed in one loop."""
     names = [h.name for h in history]
-    by_loop: dict[Loop, list[tuple[str, int]]] = {}
+    by_loop: dict[TermLoop, list[tuple[str, int]]] = {}
     for name, value in new.items():
         if not isinstance(value, NewTerms):
             raise ModelError(
@@ -215,16 +215,16 @@ def updates(
     for loop, pairs in by_loop.items():
         lengths = {a.lengths for a in loop.arrays}
         slots = tuple(names.index(name) for name, _ in pairs)
-        chosen = [k for _, k in pairs]
+        selected = [k for _, k in pairs]
         for name, _ in pairs:
             array = history[names.index(name)].terms_of
             if array not in lengths:
                 raise ModelError(
                     f"history: {name} has a number for each term of {array}: loop over it"
                 )
-        results = loop.run(symbols, Kind.EACH, chosen, slots)
-        dummies = [sp.Dummy(real=True) for _ in chosen]
-        loop.note(symbols, Kind.EACH, chosen, dummies)
+        results = loop.run(symbols, Kind.EACH, selected, slots)
+        dummies = [sp.Dummy(real=True) for _ in selected]
+        loop.note(symbols, Kind.EACH, selected, dummies)
         for (name, _), node, dummy in zip(pairs, results, dummies, strict=True):
             nodes[name] = node
             symbols.record.updates.append((names.index(name), dummy))

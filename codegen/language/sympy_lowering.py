@@ -11,7 +11,7 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.graph.graph import Graph, InputEntry, Node, Op
 from softehl.codegen.graph.length_derivatives import length
 from softehl.codegen.graph.traversal import Recursion, recursion
 from softehl.codegen.graph.value_domain import Domain, decidable
@@ -325,7 +325,7 @@ class Symbols:
         return {
             str(s)
             for s, n in self.bound.items()
-            if isinstance(n.payload, Input) and n.payload.array != "arrays"
+            if isinstance(n.payload, InputEntry) and n.payload.array != "arrays"
         }
 
     def numbered(self, label: str) -> str:
@@ -376,11 +376,11 @@ class Symbols:
             raise ModelError(
                 f"the name {label} is used twice in model {self.model}, for {kinds}: rename one"
             )
-        known = symbol in self.bound
+        is_bound = symbol in self.bound
         self.bound[symbol] = node
-        if isinstance(node.payload, Input):
+        if isinstance(node.payload, InputEntry):
             self.record.inputs[symbol] = (node.payload.array, node.payload.index)
-        elif not known:
+        elif not is_bound:
             self.state(label, node)
         return symbol
 
@@ -395,6 +395,6 @@ _KINDS = {
 
 def _kind(node: Node) -> str:
     """Kind of a named quantity, for messages."""
-    if not isinstance(node.payload, Input):
+    if not isinstance(node.payload, InputEntry):
         return "an intermediate"
     return _KINDS.get(node.payload.array, node.payload.array)

@@ -48,7 +48,7 @@ class Principal:
 
 
 @dataclass(frozen=True)
-class External:
+class ExternalResult:
     """Result `index` of a C function of the user at `inputs`."""
 
     function: ExternalFunction
@@ -79,7 +79,7 @@ class MatrixFunction:
 
 
 @dataclass(frozen=True)
-class Result:
+class FunctionResult:
     """Entry `index` of the results of a function."""
 
     of: MatrixFunction
@@ -144,14 +144,14 @@ class SympyTape:
     ) -> None:
         """Note the names of the results of a C function of the user."""
         for k, symbol in enumerate(results):
-            self.define(symbol, External(function, tuple(inputs), k))
+            self.define(symbol, ExternalResult(function, tuple(inputs), k))
 
     def matrix_function(self, function: MatrixFunction, results: Sequence[Any]) -> None:
         """Note a function of a matrix and the names of its results."""
         for s in function.function[:1]:
             self.meanings[s] = Local()
         for k, s in enumerate(results):
-            self.define(s, Result(function, k))
+            self.define(s, FunctionResult(function, k))
 
     def reduction(
         self,

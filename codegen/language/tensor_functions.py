@@ -15,8 +15,8 @@ from softehl.codegen.graph.routines import depends, localise
 from softehl.codegen.graph.tensor_functions import (
     Eigenvalues,
     Exponential,
-    Isotropic,
-    Part,
+    FunctionPart,
+    IsotropicFunction,
     TensorFunction,
     TensorRoutine,
     entry_pairs,
@@ -55,7 +55,9 @@ class TensorFunctions:
                 "depends on it; write it outside"
             )
         system = localise(symbols.graph, [value], inputs)
-        function = Isotropic(label, f"m.{what}", size, len(system.external), f=system.values[0])
+        function = IsotropicFunction(
+            label, f"m.{what}", size, len(system.external), f=system.values[0]
+        )
         try:
             function.differences(symbols.graph)
         except DifferentiationError as failed:
@@ -75,7 +77,7 @@ class TensorFunctions:
             return self.isotropic("exp", A, sp.exp)
         label = self._label("exp")
         function = Exponential(label, "m.exp", size)
-        results = function.run(symbols.graph, Part.VALUE, nodes)
+        results = function.run(symbols.graph, FunctionPart.VALUE, nodes)
         names = symbols.named(label, Entries.of(A), results, list(A))
         record = MatrixFunction("exponential", tuple(A))
         symbols.record.matrix_function(record, list(names))
@@ -88,7 +90,7 @@ class TensorFunctions:
         label = self._label("eigenvalue")
         function = Eigenvalues(label, "m.eigenvalues", size)
         like = Entries.of([0] * size)
-        results = function.run(symbols.graph, Part.VALUE, entries)
+        results = function.run(symbols.graph, FunctionPart.VALUE, entries)
         names = symbols.named(label, like, results, list(C))
         symbols.record.matrix_function(MatrixFunction("eigenvalues", tuple(C)), names)
         return tuple(names)
@@ -108,7 +110,7 @@ class TensorFunctions:
         symbols, size = self._symbols, function.size
         pairs = entry_pairs(size)
         like = Entries([0] * len(pairs), [f"_{i}{j}" for i, j in pairs], list)
-        results = function.run(symbols.graph, Part.VALUE, args)
+        results = function.run(symbols.graph, FunctionPart.VALUE, args)
         names = symbols.named(label, like, results, below)
         made = Matrix(size, size, lambda i, j: names[pairs.index((min(i, j), max(i, j)))])
         symbols.record.matrix_function(record, list(made))

@@ -115,7 +115,7 @@ def pressure_stress(H: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class Surfaces:
+class RoughSurfaces:
     """Effective thicknesses and factors of surfaces with a gap h, by (14) and (17).
 
     effective: thickness of flow and shear; content: mean gap; carried: thickness that a rod of
@@ -133,12 +133,12 @@ class Surfaces:
     asperities: Any = 0
 
     @classmethod
-    def smooth(cls, h: Any) -> Surfaces:
+    def smooth(cls, h: Any) -> RoughSurfaces:
         """Without roughness."""
         return cls(h, h, h, lambda other: other)
 
     @classmethod
-    def rough(cls, m: Model, h: Any, sigma: Any, c: Any) -> Surfaces:
+    def rough(cls, m: Model, h: Any, sigma: Any, c: Any) -> RoughSurfaces:
         """Heights of rms sigma; c = (rod^2 - seal^2) / sigma^2 says on which surface they are."""
         H = m.define("H", h / sigma, interface=True)
         He = m.define("H_effective", effective(H), interface=True)
@@ -268,10 +268,10 @@ def _wedge(m: Model, bounds: list[Any]) -> tuple[Any, Any]:
     return mean, m.define("narrowing", h_1 * h_2 / mean**2)
 
 
-def _surfaces(m: Model, h: Any, V: Any, rough: bool) -> tuple[Surfaces, Any, Any]:
+def _surfaces(m: Model, h: Any, V: Any, rough: bool) -> tuple[RoughSurfaces, Any, Any]:
     """The surfaces, the pressure of their asperities, and its friction."""
     if not rough:
-        return Surfaces.smooth(h), sp.Integer(0), sp.Integer(0)
+        return RoughSurfaces.smooth(h), sp.Integer(0), sp.Integer(0)
     sigma, c, K, mu_b, U_b = m.parameters(
         roughness="rms height sigma of both surfaces together [mm]",
         roughness_difference="(rod^2 - seal^2) / sigma^2 of the rms heights",
@@ -279,7 +279,7 @@ def _surfaces(m: Model, h: Any, V: Any, rough: bool) -> tuple[Surfaces, Any, Any
         boundary_friction="friction coefficient of touching asperities",
         boundary_speed="speed U_b at which their friction has 0.7 of its value [mm/s]",
     )
-    surfaces = Surfaces.rough(m, h, sigma, c)
+    surfaces = RoughSurfaces.rough(m, h, sigma, c)
     p_a = m.define("p_a", K * surfaces.asperities)
     tau_a = m.define("tau_a", mu_b * p_a * V / sp.sqrt(V**2 + U_b**2))
     return surfaces, p_a, tau_a

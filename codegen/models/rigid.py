@@ -100,9 +100,9 @@ def touch(dimension: int) -> Definition:
     arm = [m.define(f"arm_{k}", x[k] - a[k] - U[k]) for k in range(dimension)]
     back = _times([list(column) for column in zip(*R, strict=True)], arm)
     y = [m.define(f"y_{k}", a[k] + v, interface=True) for k, v in enumerate(back)]
-    apart = [m.define(f"apart_{k}", y[k] - c[k]) for k in range(dimension)]
-    along = m.define("along", _dot(n, apart))
-    radial = [m.define(f"radial_{k}", apart[k] - along * n[k]) for k in range(dimension)]
+    offset = [m.define(f"apart_{k}", y[k] - c[k]) for k in range(dimension)]
+    along = m.define("along", _dot(n, offset))
+    radial = [m.define(f"radial_{k}", offset[k] - along * n[k]) for k in range(dimension)]
     is_flat = flat > sp.Rational(1, 2)
     square = sp.Piecewise((1, is_flat), (_dot(radial, radial), True))
     length = m.define("length", sp.sqrt(square))
@@ -127,8 +127,8 @@ def touch(dimension: int) -> Definition:
         q = m.define("q", sp.Piecewise((slides, augmented >= 0), (0, True)))
         shear, means = [q * v for v in t], [q]
     else:
-        here = _times([list(column) for column in zip(*R, strict=True)], tau)
-        stick = [m.define(f"stick_{k}", here[k] + rho * slip[k]) for k in range(3)]
+        local = _times([list(column) for column in zip(*R, strict=True)], tau)
+        stick = [m.define(f"stick_{k}", local[k] + rho * slip[k]) for k in range(3)]
         across = m.define("across", _dot(stick, normal))
         tangential = [m.define(f"tangential_{k}", stick[k] - across * normal[k]) for k in range(3)]
         size = m.define("size", _dot(tangential, tangential))

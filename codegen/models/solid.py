@@ -36,7 +36,7 @@ def _energy(m: Model, label: str, F: kin.Gradient, material: Any) -> Any:
     return _isochoric(m, label, F, isochoric, bars) + volumetric(I3)
 
 
-def _isochoric(m: Model, label: str, F: kin.Gradient, term: energies.Term, bars: Any) -> Any:
+def _isochoric(m: Model, label: str, F: kin.Gradient, term: energies.EnergyTerm, bars: Any) -> Any:
     """The isochoric term; bars: I1bar and I2bar."""
     if term.of == "invariants":
         I1bar, I2bar = bars

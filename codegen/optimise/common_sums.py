@@ -20,7 +20,7 @@ from fractions import Fraction
 from heapq import heappop, heappush
 from itertools import combinations
 
-from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.graph.graph import Graph, InputEntry, Node, Op
 from softehl.codegen.graph.traversal import reachable
 
 Row = dict[Node, int]
@@ -212,7 +212,7 @@ def first_difference(n: Node) -> bool:
 
     It is taken first, as the model says: this is where digits would be lost.
     """
-    arrays = {a.payload.array for a in n.args if isinstance(a.payload, Input)}
+    arrays = {a.payload.array for a in n.args if isinstance(a.payload, InputEntry)}
     return len(arrays) == 2
 
 

@@ -14,7 +14,7 @@ from fractions import Fraction
 import mpmath
 
 from softehl.codegen.external_function import ExternalFunction
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, ResultIndex
+from softehl.codegen.graph.graph import BOOLEAN, Graph, InputEntry, Node, Op, ResultIndex
 from softehl.codegen.graph.precise_arithmetic import number
 from softehl.codegen.graph.routines import External
 from softehl.codegen.graph.run_time_arrays import Network
@@ -105,15 +105,15 @@ def calls(g: Graph, roots: Roots) -> Roots:
 
 def _loops(g: Graph, roots: Roots) -> Roots:
     """One loop over terms for all results with the same operands."""
-    wanted: dict[tuple[int, tuple[Node, ...]], dict[Entry, None]] = {}
+    entries_of_calls: dict[tuple[int, tuple[Node, ...]], dict[Entry, None]] = {}
     for n in reachable(roots):
         call = n.args[0] if n.op is Op.ITEM else n
         if isinstance(call.payload, Reduction) and isinstance(n.payload, ResultIndex):
             key = call.payload.root, call.args
-            wanted.setdefault(key, {})[call.payload.entries[n.payload.index]] = None
-    if not wanted:
+            entries_of_calls.setdefault(key, {})[call.payload.entries[n.payload.index]] = None
+    if not entries_of_calls:
         return roots
-    together = {key: tuple(sorted(entries)) for key, entries in wanted.items()}
+    together = {key: tuple(sorted(entries)) for key, entries in entries_of_calls.items()}
 
     def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
         payload, call = n.payload, n.args[0] if n.op is Op.ITEM else n
@@ -300,7 +300,7 @@ def unrolled(points: Sequence[Sequence[Fraction]], data: tuple[int, int] = (0, 0
 
     def apply(g: Graph, roots: Roots) -> Roots:
         def leaf(n: Node, q: int) -> Node:
-            assert isinstance(n.payload, Input)
+            assert isinstance(n.payload, InputEntry)
             if n.payload.array == "point data":
                 return g.input("data", data[0] + data[1] * q + n.payload.index)
             return g.const(points[q][n.payload.index])

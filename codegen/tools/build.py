@@ -113,8 +113,8 @@ def build(
             start = perf_counter()
             text = source.read_text(encoding="utf-8")
             lanes = [] if wide is None or source.stem in wide else ["-DSOFTEHL_LANES=1"]
-            own = [*compiling, *extra_flags(source, text), *lanes, *extra]
-            arguments = [*command, *supported(command, own)]
+            all_flags = [*compiling, *extra_flags(source, text), *lanes, *extra]
+            arguments = [*command, *supported(command, all_flags)]
             if source.name.startswith(SHARED):
                 shutil.copyfile(_shared(source, text, arguments, flags), to)
             else:
@@ -195,7 +195,7 @@ def identification(flags: Sequence[str] = FLAGS) -> str:
 def macros_of(identified: str) -> dict[str, str]:
     """Values of predefined macros by name, of an `identification`."""
     lines = (line.split(maxsplit=2) for line in identified.splitlines()[1:])
-    return {words[1]: words[2] if len(words) > 2 else "" for words in lines if len(words) > 1}
+    return {fields[1]: fields[2] if len(fields) > 2 else "" for fields in lines if len(fields) > 1}
 
 
 def compiler_name() -> str:

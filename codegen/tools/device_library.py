@@ -29,7 +29,7 @@ def device_source(definition: Definition, real: str = "double") -> DeviceSource:
     """Device kernels of a page on a kind of cell.  Raises `TargetError`."""
     kernels = pipeline.device_kernels(definition)
     text = kernels.text(real)
-    found = re.findall(r"^KERNEL(?:_LARGE)?\((\w+), \d+, int n, (.*)\)$", text, re.MULTILINE)
+    signatures = re.findall(r"^KERNEL(?:_LARGE)?\((\w+), \d+, int n, (.*)\)$", text, re.MULTILINE)
     return DeviceSource(
         name=definition.name,
         files={
@@ -50,7 +50,7 @@ def device_source(definition: Definition, real: str = "double") -> DeviceSource:
         history=len(definition.point_data),
         symmetric=kernels.symmetric,
         orders=tuple(kernels.orders),
-        kernels={name: arguments.count("*") for name, arguments in found},
+        kernels={name: arguments.count("*") for name, arguments in signatures},
         real="float32" if real == "float" else "float64",
     )
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from softehl.codegen.abi import TargetError
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.hosts import registry
 from softehl.codegen.hosts.element_interface import ElementInterface
 from softehl.codegen.hosts.material_response import solid
@@ -57,8 +57,8 @@ def generate(
 def files(d: Definition | Law, target: str) -> dict[str, str]:
     """Every file of a model for a host.  Raises `TargetError`, `NoStateError`."""
     writers = registry.host(target)
-    shown = replace(solid(d), name=d.name) if isinstance(d, Law) else d
-    arrays = tuple(a.name for a in shown.arrays)
+    element = replace(solid(d), name=d.name) if isinstance(d, Law) else d
+    arrays = tuple(a.name for a in element.arrays)
     if arrays and not writers.arrays:
         allowed = [t for t in registry.targets() if registry.host(t).arrays]
         raise TargetError(
@@ -71,7 +71,7 @@ def files(d: Definition | Law, target: str) -> dict[str, str]:
                 f"{d.name} is a material: target {target} takes elements, materials go to "
                 f"{', '.join(t for t in registry.targets() if registry.host(t).material)}"
             )
-        ElementInterface.of(shown, target)  # raises for what no host has
+        ElementInterface.of(element, target)  # raises for what no host has
         return writers.material(d, _states)
     if writers.element is None:
         raise TargetError(
@@ -83,7 +83,7 @@ def files(d: Definition | Law, target: str) -> dict[str, str]:
     return writers.element(interface, _states(interface.definition))
 
 
-def _states(d: Definition) -> list[State]:
+def _states(d: Definition) -> list[EvaluationState]:
     random_states.check_external_functions(d)
     return random_states.admissible_states(d, STATES)
 

@@ -30,7 +30,7 @@ _SOFTEHL = Path(__file__).parents[2]
 
 
 @dataclass(eq=False)
-class Inputs:
+class FilesRead:
     """Files that a run of a model has read.
 
     texts: of Python files of its folder that were run, by their path. digests: SHA-256 of other
@@ -52,11 +52,11 @@ class Inputs:
         folder = path.resolve().parent
         others = {}
         for p, d in self.digests.items():
-            place = Path(p).resolve()
-            if place not in self.texts:
-                inside = Path(p).is_absolute() and place.is_relative_to(folder)
+            resolved = Path(p).resolve()
+            if resolved not in self.texts:
+                inside = Path(p).is_absolute() and resolved.is_relative_to(folder)
                 others[
-                    model_text.BESIDE + place.relative_to(folder).as_posix() if inside else p
+                    model_text.BESIDE + resolved.relative_to(folder).as_posix() if inside else p
                 ] = d
         for file, text in self.texts.items():
             name = file.relative_to(folder).as_posix()
@@ -72,15 +72,15 @@ _ONE = threading.RLock()
 
 
 @contextmanager
-def imports_from(folder: Path) -> Iterator[Inputs]:
+def imports_from(folder: Path) -> Iterator[FilesRead]:
     """Let a model import from its folder, and restore the previous modules afterwards."""
     with _ONE, _isolated(folder) as inputs:
         yield inputs
 
 
 @contextmanager
-def _isolated(folder: Path) -> Iterator[Inputs]:
-    inputs, finder = Inputs(), _Finder(folder)
+def _isolated(folder: Path) -> Iterator[FilesRead]:
+    inputs, finder = FilesRead(), _Finder(folder)
     finder.inputs = inputs
     previous = _modules_in(folder, finder)
     for name in previous:
@@ -194,7 +194,7 @@ def _fixed(module: ModuleType) -> bool:
 class _Finder(MetaPathFinder):
     """Finds the modules of a folder, before all others."""
 
-    inputs: Inputs
+    inputs: FilesRead
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -230,14 +230,14 @@ class _Finder(MetaPathFinder):
 class _Loader(SourceFileLoader):
     """Runs the text of a file, whose bytecode may be that of another text of the same second."""
 
-    inputs: Inputs
+    inputs: FilesRead
 
     def get_code(self, fullname: str) -> CodeType:
         """The file as it is now."""
         return code_of(Path(self.path), model_text.read(Path(self.path)), self.inputs)
 
 
-def code_of(path: Path, text: str, inputs: Inputs) -> CodeType:
+def code_of(path: Path, text: str, inputs: FilesRead) -> CodeType:
     """A text of a file, to be run."""
     inputs.texts[path.resolve()] = text
     linecache.checkcache(str(path))
@@ -247,11 +247,11 @@ def code_of(path: Path, text: str, inputs: Inputs) -> CodeType:
 
 # ------------------------------------------------------------------------------ files that are read
 
-_recording: list[tuple[int, Inputs]] = []
+_recording: list[tuple[int, FilesRead]] = []
 
 
 @contextmanager
-def _recorded(inputs: Inputs) -> Iterator[None]:
+def _recorded(inputs: FilesRead) -> Iterator[None]:
     """Record the files that this thread opens to read them."""
     _hook()
     _recording.append((threading.get_ident(), inputs))
@@ -278,7 +278,7 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
             _note(os.fsdecode(path), active)
 
 
-def _note(path: str, active: list[Inputs]) -> None:
+def _note(path: str, active: list[FilesRead]) -> None:
     if path.endswith(".pyc"):
         path = source_from_cache(path)
     file = Path(path).resolve()

@@ -48,7 +48,7 @@ Variant: TypeAlias = "int | tuple[str, ...]"
 
 
 @dataclass(frozen=True)
-class Library:
+class CachedLibrary:
     """Files and compiled kernels of some models.
 
     folder: in the cache; holds `files` and the shared library.  derived, compiled: seconds by
@@ -226,7 +226,7 @@ def _texts(where: CellKey) -> list[str]:
 
 def of_files(
     paths: Sequence[Path], on: CellOptions | None = None
-) -> tuple[list[Definition], Library]:
+) -> tuple[list[Definition], CachedLibrary]:
     """The models of some files, which are run, and their library."""
     from softehl.codegen.language.weak_form import DEFAULT_CELL
     from softehl.codegen.tools import model_loader
@@ -249,7 +249,7 @@ def library(
     read: Mapping[str, str] | None = None,
     *,
     check: bool = True,
-) -> Library:
+) -> CachedLibrary:
     """Library of some models; the derived C is stored under `key` as well.
 
     read: as in `cache.remember`. check: with the quick check of kernels that have not been through
@@ -265,7 +265,7 @@ def library(
             _checked(definitions, files, folder)
     if key is not None:
         store.remember(key, files, read)
-    return Library(folder, files, derived, seconds)
+    return CachedLibrary(folder, files, derived, seconds)
 
 
 def _checked(definitions: Sequence[Definition], files: Mapping[str, str], folder: Path) -> None:
@@ -302,14 +302,14 @@ class BuildProgress:
         if self._timer is not None:
             self._timer.cancel()
 
-    def begin(self, stage: str) -> None:
+    def begin(self, task: str) -> None:
         """Report a stage at once, or as soon as it is late enough and goes on."""
         self.__exit__()
         left = self._start + PATIENCE - perf_counter()
         if left <= 0:
-            _report(stage)
+            _report(task)
             return
-        self._timer = Timer(left, _report, [stage])
+        self._timer = Timer(left, _report, [task])
         self._timer.daemon = True
         self._timer.start()
 

@@ -37,7 +37,7 @@ from softehl.codegen.language.material import Law
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.model_builder import varying_parameters
 from softehl.codegen.language.weak_form import DEFAULT_CELL, CellOptions, Page
-from softehl.codegen.tools.import_record import Inputs, code_of, imports_from
+from softehl.codegen.tools.import_record import FilesRead, code_of, imports_from
 from softehl.codegen.tools.model_text import ModelFileError, read
 from softehl.system import name_fault
 
@@ -68,7 +68,7 @@ def definitions(path: Path, on: CellOptions = DEFAULT_CELL) -> list[Definition]:
 
 def definitions_and_inputs(
     path: Path, on: CellOptions = DEFAULT_CELL
-) -> tuple[list[Definition], Inputs]:
+) -> tuple[list[Definition], FilesRead]:
     """As `definitions`, with what the run has read."""
     definitions, inputs = _pages_and_inputs(path, on, laws_only=False)
     return [d for d in definitions if isinstance(d, Definition)], inputs
@@ -81,7 +81,7 @@ def pages(path: Path, on: CellOptions = DEFAULT_CELL) -> list[Definition | Law]:
 
 def _pages_and_inputs(
     path: Path, on: CellOptions, *, laws_only: bool
-) -> tuple[list[Definition | Law], Inputs]:
+) -> tuple[list[Definition | Law], FilesRead]:
     """Models of a file; its materials as laws, or as bodies if it has no models."""
     path = path.resolve()
     text = read(path)
@@ -164,7 +164,7 @@ def require_file_name(name: str) -> None:
 # ------------------------------------------------------------------------------------- running it
 
 
-def _run(path: Path, text: str, inputs: Inputs) -> ModuleType:
+def _run(path: Path, text: str, inputs: FilesRead) -> ModuleType:
     module = ModuleType(f"softehl_model_{path.stem}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses look there; removed with the neighbours

@@ -10,7 +10,7 @@ from typing import Any
 from softehl.codegen import abi
 from softehl.codegen.emit import c_source
 from softehl.codegen.emit.liveness import peak_live
-from softehl.codegen.graph.run_time_arrays import RunTimeArray
+from softehl.codegen.graph.run_time_arrays import ArraySymbol
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.pipeline import Function, KernelSource
 
@@ -96,7 +96,7 @@ def _term_history(d: Definition) -> dict[str, str]:
     return {h.name: h.terms_of for h in d.term_history}
 
 
-def _array(a: RunTimeArray) -> dict[str, Any]:
+def _array(a: ArraySymbol) -> dict[str, Any]:
     return {"meaning": a.meaning, "kind": a.layout.kind, **a.layout.options}
 
 

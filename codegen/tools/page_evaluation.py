@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import kernel_cache
 from softehl.codegen.tools.model_text import ModelFileError
@@ -27,7 +27,7 @@ def evaluate(
     """
     explained = explain(
         definition_of(folder, kernel),
-        State(
+        EvaluationState(
             coordinates=state.coordinates.tolist(),
             dofs=state.dofs.tolist(),
             data=state.data.tolist(),

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from softehl.codegen import pipeline
-from softehl.codegen.derive.potential_structure import Structure
+from softehl.codegen.derive.potential_structure import PotentialStructure
 from softehl.codegen.derive.task_outputs import tasks
 from softehl.codegen.emit.liveness import peak_live
 from softehl.codegen.graph.traversal import reachable
@@ -29,8 +29,8 @@ def show(definition: Definition) -> None:
         console.rule(f"{definition.name} {task}", align="left")
         stages = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
         stages.add_column(no_wrap=True)
-        for stage, text in _stages(definition, function):
-            stages.add_row(stage, text)
+        for title, text in _stages(definition, function):
+            stages.add_row(title, text)
         console.print(stages)
         console.print(_passes(function))
 
@@ -44,7 +44,7 @@ def _stages(d: Definition, f: Function) -> Iterator[tuple[str, str]]:
     if len(f.attempts) > 1:
         yield "choice", f"chain rule {f.attempts.index(f.best) + 1}"
     plan = f.plan
-    loops = sum(stage.loop is not None for stage in plan.stages)
+    loops = sum(title.loop is not None for title in plan.stages)
     per_point = f", {plan.operations_per_point} at each point" if loops else ""
     yield "schedule", f"{plan.operations_once} operations once{per_point}; {_count(loops, 'loop')}"
     scheduled, after = peak_live(f.best.plan), peak_live(plan)
@@ -53,7 +53,7 @@ def _stages(d: Definition, f: Function) -> Iterator[tuple[str, str]]:
     yield "print", f"{f.printer}: {f.temporaries} temporaries, {f.text.count(chr(10))} lines of C"
 
 
-def _interfaces(d: Definition, s: Structure | None) -> str:
+def _interfaces(d: Definition, s: PotentialStructure | None) -> str:
     if s is None:
         return f"none found; the page names {len(d.interface)}"
     modes, forms = len(s.interface.modes), len(s.forms)
@@ -61,7 +61,7 @@ def _interfaces(d: Definition, s: Structure | None) -> str:
     return f"{len(d.directions)} unknowns, {modes} modal coordinates, {point}{forms} linear forms"
 
 
-def _invariants(s: Structure | None) -> str:
+def _invariants(s: PotentialStructure | None) -> str:
     if s is None or not s.squares:
         return "none found"
     return f"{len(s.squares)} {'invariants' if s.invariants else 'quadratic values of the page'}"

@@ -141,7 +141,7 @@ def _generate(paths: Sequence[Path], folder: Path, seconds: float, on: CellOptio
 def _reports(
     paths: Sequence[Path],
     definitions: Sequence[Definition],
-    made: kernel_cache.Library,
+    made: kernel_cache.CachedLibrary,
     seconds: float,
     on: CellOptions,
 ) -> tuple[dict[str, verification.Report], list[str]]:
@@ -162,7 +162,7 @@ def _reports(
 
 
 def _times(
-    definitions: Sequence[Definition], made: kernel_cache.Library
+    definitions: Sequence[Definition], made: kernel_cache.CachedLibrary
 ) -> dict[str, dict[str, float]]:
     """Nanoseconds of one element by kernel and task; none where no state is known."""
     times = {}
@@ -190,7 +190,7 @@ def _judge(name: str, errors: Mapping[str, float]) -> int:
 
 
 def _table(
-    made: kernel_cache.Library,
+    made: kernel_cache.CachedLibrary,
     errors: Mapping[str, Mapping[str, float]],
     times: Mapping[str, Mapping[str, float]],
 ) -> Table:
@@ -226,7 +226,7 @@ def _seconds(measured: Mapping[str, float], name: str) -> str:
 # ------------------------------------------------------------------------------------ the folder
 
 
-def write(folder: Path, made: kernel_cache.Library) -> int:
+def write(folder: Path, made: kernel_cache.CachedLibrary) -> int:
     """Bring a folder up to date; returns the number of files that changed.  The library is last."""
     generated, foreign = _others(folder, made.files)
     if foreign:

@@ -16,9 +16,9 @@ import mpmath
 from mpmath.libmp import NoConvergence
 
 from softehl.codegen.graph.differentiation import gradient
-from softehl.codegen.graph.evaluation import State, Walk
-from softehl.codegen.graph.graph import BOOLEAN, Input, Node, Op, ResultIndex, Routine
-from softehl.codegen.graph.routines import Newton
+from softehl.codegen.graph.evaluation import EvaluationState, Walk
+from softehl.codegen.graph.graph import BOOLEAN, InputEntry, Node, Op, ResultIndex, Routine
+from softehl.codegen.graph.routines import NewtonRoutine
 from softehl.codegen.graph.run_time_arrays import ArrayRoutine
 from softehl.codegen.graph.tensor_functions import TensorRoutine
 from softehl.codegen.graph.traversal import reachable
@@ -43,24 +43,24 @@ class NamedValue:
 
 
 @dataclass(frozen=True)
-class Explanation:
+class GraphExplanation:
     """Named values in the order of the page; fault: the first operation without a value, or ""."""
 
     values: tuple[NamedValue, ...]
     fault: str
 
 
-def explain(d: Definition, state: State) -> Explanation:
+def explain(d: Definition, state: EvaluationState) -> GraphExplanation:
     """Explanation of a model at a state of one element."""
     with mpmath.workdps(DIGITS):
         evaluation = _Evaluation(d, state)
-        return Explanation(tuple(evaluation.named_values()), evaluation.fault())
+        return GraphExplanation(tuple(evaluation.named_values()), evaluation.fault())
 
 
 class _Evaluation:
     """Values of the nodes of a model at a state; None where there is no double."""
 
-    def __init__(self, d: Definition, state: State) -> None:
+    def __init__(self, d: Definition, state: EvaluationState) -> None:
         self.d, self.state = d, state
         self.walk = Walk(state, {})
         self.points = range(len(state.rule))
@@ -87,7 +87,9 @@ class _Evaluation:
         for s in self.d.statements:
             if s.name and s.value not in self.labels:
                 local = {
-                    n.payload.array for n in reachable([s.value]) if isinstance(n.payload, Input)
+                    n.payload.array
+                    for n in reachable([s.value])
+                    if isinstance(n.payload, InputEntry)
                 } - _ARRAYS
                 where = "" if s.name.startswith(GEOMETRY) else _page_line(s.where)
                 if not local:
@@ -102,7 +104,7 @@ class _Evaluation:
         """Solutions of local equations by their array of placeholders."""
         solutions: dict[str, dict[int, Node]] = {}
         for n in reachable([s.value for s in self.d.statements]):
-            if isinstance(n.payload, ResultIndex) and isinstance(n.args[0].payload, Newton):
+            if isinstance(n.payload, ResultIndex) and isinstance(n.args[0].payload, NewtonRoutine):
                 items = solutions.setdefault(f"local {n.args[0].payload.name}", {})
                 items[n.payload.index] = n
         return {array: [items[k] for k in sorted(items)] for array, items in solutions.items()}
@@ -158,8 +160,8 @@ class _Evaluation:
             return [(n.args[0], k) for k in reversed(self.points)]
         if n.op is Op.BRANCH:
             condition = self.value(n.args[0], q)
-            taken = [] if condition is None else [(n.args[1 if condition else 2], q)]
-            return [*taken, (n.args[0], q)]
+            active = [] if condition is None else [(n.args[1 if condition else 2], q)]
+            return [*active, (n.args[0], q)]
         return [(a, q) for a in reversed(n.args)]
 
     def _described(self, n: Node, q: int) -> str:
@@ -179,8 +181,8 @@ class _Evaluation:
             return f"{n.args[0].payload.function.what} has no value{point}{self._line(n)}"
         if n.op is Op.ITEM and isinstance(n.args[0].payload, Routine):
             return f"{n.args[0].payload.name} has no solution{point}{self._line(n)}"
-        shown = {_text(a, names, 1): self.value(a, q) for a in n.args if a.op is not Op.CONST}
-        values = ", ".join(f"{k} = {_double(v):.6g}" for k, v in shown.items())
+        values_of = {_text(a, names, 1): self.value(a, q) for a in n.args if a.op is not Op.CONST}
+        values = ", ".join(f"{k} = {_double(v):.6g}" for k, v in values_of.items())
         text = _text(n, names, DEPTH)
         return f"{text} has no value{point}{', ' if values else ''}{values}{self._line(n)}"
 
@@ -238,7 +240,7 @@ def _labels(d: Definition) -> dict[Node, str]:
     roots = [d.potential, *(s.value for s in d.statements), *(n for _, n in d.fields)]
     labels = {}
     for n in reachable(roots):
-        if isinstance(n.payload, Input) and n.payload.array in names:
+        if isinstance(n.payload, InputEntry) and n.payload.array in names:
             labels[n] = names[n.payload.array][n.payload.index]
     return labels
 
@@ -280,9 +282,11 @@ def _text(n: Node, names: Mapping[Node, str], depth: int) -> str:
         return f"-{enclosed[0]}"
     if n.op is Op.POW:
         exponent = Fraction(n.payload)  # type: ignore[arg-type]
-        root, whole = f"sqrt({parts[0]})", exponent.denominator == 1
+        root, integral = f"sqrt({parts[0]})", exponent.denominator == 1
         special = {Fraction(1, 2): root, Fraction(-1, 2): f"1/{root}"}
-        return special.get(exponent) or f"{enclosed[0]}**{exponent if whole else f'({exponent})'}"
+        return (
+            special.get(exponent) or f"{enclosed[0]}**{exponent if integral else f'({exponent})'}"
+        )
     if n.op is Op.POWER:
         return f"{enclosed[0]}**{enclosed[1]}"
     return f"{n.op}({', '.join(parts)})"
@@ -292,4 +296,4 @@ def _double(v: Any) -> float:
     return float("nan") if v is None else float(v)
 
 
-__all__ = ["Explanation", "NamedValue", "explain"]
+__all__ = ["GraphExplanation", "NamedValue", "explain"]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import mpmath
 
-from softehl.codegen.graph.evaluation import Number, State, Vector, Walk, exact
+from softehl.codegen.graph.evaluation import EvaluationState, Number, Vector, Walk, exact
 from softehl.codegen.graph.graph import Node
 from softehl.codegen.language.definition import Definition
 
@@ -28,19 +28,19 @@ class Oracle:
     digits: int = 90
     step: int = 20
 
-    def potential(self, state: State) -> Number:
+    def potential(self, state: EvaluationState) -> Number:
         """Value of the (pseudo-)potential."""
         with mpmath.workdps(self.digits):
             return Walk(state, {}).value(self.definition.potential)
 
-    def fields(self, state: State) -> list[Vector]:
+    def fields(self, state: EvaluationState) -> list[Vector]:
         """Field values, [point][field]."""
         with mpmath.workdps(self.digits):
             walk = Walk(state, {})
             nodes = [n for _, n in self.definition.fields]
             return [[walk.at(n, q) for n in nodes] for q in range(len(state.rule))]
 
-    def residual(self, state: State, along: Rows = None) -> Vector:
+    def residual(self, state: EvaluationState, along: Rows = None) -> Vector:
         """Derivative of the potential with the constants frozen at `state`.
 
         Every component; with `along` the products of these vectors with it, which are cheaper
@@ -49,7 +49,7 @@ class Oracle:
         with mpmath.workdps(self.digits):
             return self._residual(state, exact(state.dofs), along)
 
-    def tangent(self, state: State) -> list[Vector]:
+    def tangent(self, state: EvaluationState) -> list[Vector]:
         """Rows dR_i/du_j, derivative of `residual` (constants follow the state here)."""
         with mpmath.workdps(self.digits):
             h = mpmath.mpf(10) ** -self.step
@@ -60,19 +60,25 @@ class Oracle:
                 columns.append([(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)])
             return [list(row) for row in zip(*columns, strict=True)]
 
-    def product(self, state: State, direction: Sequence[Number], along: Rows = None) -> Vector:
+    def product(
+        self, state: EvaluationState, direction: Sequence[Number], along: Rows = None
+    ) -> Vector:
         """Tangent times `direction`: one difference of the residual, where `tangent` takes ndof."""
         with mpmath.workdps(self.digits):
             return self._rate(state, "dofs", exact(direction), along)
 
-    def derivative(self, state: State, array: str, index: int, along: Rows = None) -> Vector:
+    def derivative(
+        self, state: EvaluationState, array: str, index: int, along: Rows = None
+    ) -> Vector:
         """Derivative of the residual by one entry of `coordinates`, `data` or `parameters`."""
         with mpmath.workdps(self.digits):
             size = len(getattr(state, array))
             unit = [mpmath.mpf(k == index) for k in range(size)]
             return self._rate(state, array, unit, along)
 
-    def pseudo_load(self, state: State, direction: Sequence[Number], along: Rows = None) -> Vector:
+    def pseudo_load(
+        self, state: EvaluationState, direction: Sequence[Number], along: Rows = None
+    ) -> Vector:
         """Derivative of the residual along a variation of coordinates, data and parameters."""
         with mpmath.workdps(self.digits):
             h = mpmath.mpf(10) ** -self.step
@@ -80,7 +86,7 @@ class Oracle:
             plus, minus = (self._residual(at, exact(at.dofs), along) for at in moved)
             return [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
 
-    def fields_rate(self, state: State, direction: Sequence[Number]) -> list[Vector]:
+    def fields_rate(self, state: EvaluationState, direction: Sequence[Number]) -> list[Vector]:
         """Derivative of the fields, [point][field], along a variation that ends with the dofs."""
         h = mpmath.mpf(10) ** -self.step
         with mpmath.workdps(self.digits):
@@ -90,14 +96,14 @@ class Oracle:
                 for rows in zip(plus, minus, strict=True)
             ]
 
-    def _rate(self, state: State, array: str, direction: Vector, along: Rows) -> Vector:
+    def _rate(self, state: EvaluationState, array: str, direction: Vector, along: Rows) -> Vector:
         h = mpmath.mpf(10) ** -self.step
         base = exact(getattr(state, array))
         moved = (replace(state, **{array: _along(base, s * h, direction)}) for s in (1, -1))
         plus, minus = (self._residual(at, exact(at.dofs), along) for at in moved)
         return [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
 
-    def _residual(self, state: State, dofs: Vector, along: Rows = None) -> Vector:
+    def _residual(self, state: EvaluationState, dofs: Vector, along: Rows = None) -> Vector:
         h = mpmath.mpf(10) ** -self.step
         frozen = self._frozen(state, dofs)
         size = range(len(dofs))
@@ -111,14 +117,14 @@ class Oracle:
             out.append((plus - minus) / (2 * h))
         return out
 
-    def _frozen(self, state: State, dofs: Vector) -> dict[tuple[Node, int], Number]:
+    def _frozen(self, state: EvaluationState, dofs: Vector) -> dict[tuple[Node, int], Number]:
         walk = Walk(state, {}, dofs)
         return {
             (n, q): walk.at(n, q) for n in self.definition.constant for q in range(len(state.rule))
         }
 
 
-def _varied(state: State, step: Number, direction: Sequence[Number]) -> State:
+def _varied(state: EvaluationState, step: Number, direction: Sequence[Number]) -> EvaluationState:
     """State displaced along a direction of coordinates, data, parameters and optionally dofs."""
     moved, entries = {}, list(direction)
     for array in ("coordinates", "data", "parameters", "dofs"):

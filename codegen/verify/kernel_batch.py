@@ -11,7 +11,7 @@ from typing import Any
 
 from softehl.codegen import abi
 from softehl.codegen.emit.c_printer import design_width, point_width
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.graph.graph import Op
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition
@@ -23,7 +23,11 @@ class Batch:
     """The kernels of one family called on all states at once."""
 
     def __init__(
-        self, d: Definition, library: Any, states: Sequence[State], along: Sequence[Vector]
+        self,
+        d: Definition,
+        library: Any,
+        states: Sequence[EvaluationState],
+        along: Sequence[Vector],
     ) -> None:
         states = [_with_addresses(d, s) for s in states] if d.functions else states
         self.d, self.library, self.states = d, library, states
@@ -91,40 +95,40 @@ class Batch:
         return any(all(map(math.isnan, v)) for v in (values[:1] if first else values))
 
 
-def _with_addresses(d: Definition, s: State) -> State:
+def _with_addresses(d: Definition, s: EvaluationState) -> EvaluationState:
     """A state with the addresses that the page knows, and nowhere where it knows none."""
-    known = dict(d.addresses)
+    addresses = dict(d.addresses)
     values = [
-        known.get(a.name, 0.0) if a.name in d.functions else v
+        addresses.get(a.name, 0.0) if a.name in d.functions else v
         for a, v in zip(d.parameters, s.parameters, strict=True)
     ]
     return replace(s, parameters=values)
 
 
-def data_of_element(d: Definition, s: State) -> list[float]:
+def data_of_element(d: Definition, s: EvaluationState) -> list[float]:
     """Data of an element, then those of each point: its own, history of terms, then their rates."""
     half = len(d.point_data) // 2 if d.point_rates else len(d.point_data)
     values = [float(v) for v in s.data]
     for q in range(len(s.rule)):
-        own = list(s.point_data[q]) if s.point_data else []
+        history = list(s.point_data[q]) if s.point_data else []
         terms = list(s.term_history[q]) if s.term_history else []
         for some, rows in (
-            (own[:half], terms[: len(d.term_history)]),
-            (own[half:], terms[len(d.term_history) :]),
+            (history[:half], terms[: len(d.term_history)]),
+            (history[half:], terms[len(d.term_history) :]),
         ):
             values += [float(v) for v in some] + [float(v) for row in rows for v in row]
     return values
 
 
-def parameters_of(state: State, *, rates: bool = False) -> list[float]:
+def parameters_of(state: EvaluationState, *, rates: bool = False) -> list[float]:
     """Parameters of a call with its run-time arrays, as `codegen.abi` has them."""
     at = len(state.parameters) + abi.ARRAY_ENTRIES * len(state.arrays)
     entries: list[float] = []
     values: list[float] = []
     moving = state.array_rates if rates else [()] * len(state.arrays)
     for array, rate in zip(state.arrays, moving, strict=True):
-        place = at + len(values)
-        entries += [place, len(array), place + len(array) if len(rate) else 0]
+        position = at + len(values)
+        entries += [position, len(array), position + len(array) if len(rate) else 0]
         values += [float(v) for v in (*array, *rate)]
     return [*map(float, state.parameters), *entries, *values]
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from softehl.codegen.abi import BuildError, Task
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.verify.kernel_batch import Batch
 from softehl.codegen.verify.random_states import NoStateError, admissible_states
@@ -69,7 +69,7 @@ def _count(d: Definition) -> int:
     return max(1, min(STATES, POINTS // len(d.rule.points)))
 
 
-def _direction(states: Sequence[State]) -> Vector:
+def _direction(states: Sequence[EvaluationState]) -> Vector:
     """Direction that changes every unknown by about its size."""
     sizes = [
         max(map(abs, map(float, u))) or 1.0 for u in zip(*(s.dofs for s in states), strict=True)
@@ -77,7 +77,7 @@ def _direction(states: Sequence[State]) -> Vector:
     return [(-1) ** k * (1 + k % 3 / 4) * size for k, size in enumerate(sizes)]
 
 
-def _moved(state: State, h: float, direction: Vector) -> State:
+def _moved(state: EvaluationState, h: float, direction: Vector) -> EvaluationState:
     return replace(
         state, dofs=[float(u) + h * w for u, w in zip(state.dofs, direction, strict=True)]
     )

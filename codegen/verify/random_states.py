@@ -19,7 +19,7 @@ import mpmath
 from mpmath.libmp import NoConvergence
 
 from softehl.codegen.elements.cells import ELEMENTS
-from softehl.codegen.graph.evaluation import State, Walk
+from softehl.codegen.graph.evaluation import EvaluationState, Walk
 from softehl.codegen.graph.graph import BOOLEAN, Node, Op, Routine
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.language.definition import Definition, functions_of_user
@@ -58,13 +58,13 @@ class NoStateError(SoftehlError, ValueError):
     """No admissible state of a model was found; the message says what the model must give."""
 
 
-def admissible_states(definition: Definition, count: int) -> list[State]:
+def admissible_states(definition: Definition, count: int) -> list[EvaluationState]:
     """`count` random admissible states with the same parameters, the same ones in every run.
 
     Raises `NoStateError`, with what to say in the model, if there are none.
     """
-    known = dict(definition.addresses)
-    unknown = [name for name in definition.functions if name not in known]
+    addresses = dict(definition.addresses)
+    unknown = [name for name in definition.functions if name not in addresses]
     if unknown:
         raise NoStateError(
             f"{definition.name} cannot be checked: it gets the address of {unknown[0]} when it is "
@@ -72,7 +72,7 @@ def admissible_states(definition: Definition, count: int) -> list[State]:
         )
     rng = random.Random(definition.name)
     evaluator = Evaluator(program(definition), Doubles())
-    states: list[State] = []
+    states: list[EvaluationState] = []
     for attempt in range(ATTEMPTS + count):
         state = draw(definition, rng, attempt)
         if states:  # the states of a call share its parameters
@@ -109,7 +109,7 @@ def check_external_functions(definition: Definition) -> None:
         f.check()
 
 
-def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
+def draw(d: Definition, rng: random.Random, attempt: int = 0) -> EvaluationState:
     """One random state; the later the attempt, the smaller the variation."""
     deviation = SPREAD * 0.93 ** min(attempt, ATTEMPTS)
     example = dict(d.example)
@@ -124,7 +124,7 @@ def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
     dofs = [vary(example[n]) if n in example else deviation * rng.uniform(-1, 1) for n in unknowns]
     rule, addresses = _rule(d), dict(d.addresses)
     arrays = [a.layout.sample(rng) for a in d.arrays]
-    return State(
+    return EvaluationState(
         coordinates=_coordinates(d, rng, deviation),
         dofs=dofs,
         data=[about_one(a.name) for a in d.data],
@@ -188,12 +188,12 @@ def _linear(xi: float, fields: int) -> list[tuple[float, ...]]:
     ]
 
 
-def fault(definition: Definition, state: State) -> str | None:
+def fault(definition: Definition, state: EvaluationState) -> str | None:
     """The first operation without a real value at a state; None if everything has one."""
     return first_fault([definition.potential, *(n for _, n in definition.fields)], state)
 
 
-def first_fault(roots: Sequence[Node], state: State) -> str | None:
+def first_fault(roots: Sequence[Node], state: EvaluationState) -> str | None:
     """The first operation below `roots` without a real value at a state."""
     with mpmath.workdps(DIGITS):
         walk = Walk(state, {})
@@ -211,7 +211,7 @@ def _described(n: Node) -> str:
     return f"{n.op}(.. {names[-1]} ..)" if names else str(n.op)
 
 
-def _real(walk: Walk, n: Node, state: State) -> bool:
+def _real(walk: Walk, n: Node, state: EvaluationState) -> bool:
     try:
         values: list[Any] = [walk.at(n, q) for q in range(len(state.rule) if n.varying else 1)]
     except (ArithmeticError, ValueError, TypeError, NoConvergence):

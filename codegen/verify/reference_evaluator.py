@@ -24,9 +24,9 @@ import mpmath
 from mpmath.libmp import NoConvergence
 
 from softehl.codegen.graph import matrix_functions
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.verify.arithmetics import CONTEXT, DIGITS, UNIT, Exact, Function, Number
-from softehl.codegen.verify.sympy_program import Program, Step
+from softehl.codegen.verify.sympy_program import Program, ProgramStep
 
 Vector = list[Number]
 Row = list[Any]
@@ -44,10 +44,10 @@ class NotRealError(ArithmeticError):
 
 
 @dataclass(frozen=True)
-class Operation:
+class StepOperation:
     """A step with the function of its operands; None: a step with a special evaluation."""
 
-    step: Step
+    step: ProgramStep
     function: Function | None
 
 
@@ -56,27 +56,27 @@ class Evaluator:
 
     def __init__(self, program: Program, arithmetic: Exact, deadline: float = float("inf")) -> None:
         self.program, self.arithmetic, self.deadline = program, arithmetic, deadline
-        self._operations: dict[int, Operation] = {}
-        self._inner: dict[int, list[Operation]] = {}
-        self._selected: dict[Any, list[Operation]] = {}
+        self._operations: dict[int, StepOperation] = {}
+        self._inner: dict[int, list[StepOperation]] = {}
+        self._selected: dict[Any, list[StepOperation]] = {}
         slots = [slot for slot, _ in program.potentials]
         at_points = [*program.fields, *program.updates]
         self.order = self.operations(program.above([*slots, *at_points]))
 
-    def operations(self, steps: Sequence[Step]) -> list[Operation]:
+    def operations(self, steps: Sequence[ProgramStep]) -> list[StepOperation]:
         """The steps with their functions."""
         for s in steps:
             if s.slot not in self._operations:
-                self._operations[s.slot] = Operation(s, _function(s, self.arithmetic))
+                self._operations[s.slot] = StepOperation(s, _function(s, self.arithmetic))
         return [self._operations[s.slot] for s in steps]
 
-    def inner(self, s: Step) -> list[Operation]:
+    def inner(self, s: ProgramStep) -> list[StepOperation]:
         """The operations inside a step."""
         if s.slot not in self._inner:
             self._inner[s.slot] = self.operations(s.inner)
         return self._inner[s.slot]
 
-    def depending(self, arrays: frozenset[str], roots: tuple[int, ...]) -> list[Operation]:
+    def depending(self, arrays: frozenset[str], roots: tuple[int, ...]) -> list[StepOperation]:
         """The operations that `roots` need and that depend on some arrays."""
         key = (arrays, roots)
         if key not in self._selected:
@@ -84,7 +84,7 @@ class Evaluator:
             self._selected[key] = self.operations([s for s in steps if s.depends & arrays])
         return self._selected[key]
 
-    def at(self, state: State) -> Evaluation:
+    def at(self, state: EvaluationState) -> Evaluation:
         """All values at a state."""
         points = len(state.rule)
         made = Evaluation(self, state, [[None] * len(self.program.steps) for _ in range(points)])
@@ -92,7 +92,7 @@ class Evaluator:
         return made
 
 
-def _function(s: Step, n: Exact) -> Function | None:
+def _function(s: ProgramStep, n: Exact) -> Function | None:
     """Function of the operands of a step."""
     plain: dict[str, Function] = {
         "<": operator.lt,
@@ -169,7 +169,7 @@ def _pieces(*pairs: Any) -> Number:
 class Evaluation:
     """All values of a program at one state, a row of them for each point."""
 
-    def __init__(self, evaluator: Evaluator, state: State, rows: list[Row]) -> None:
+    def __init__(self, evaluator: Evaluator, state: EvaluationState, rows: list[Row]) -> None:
         self.evaluator, self.state, self.rows = evaluator, state, rows
         n = evaluator.arithmetic
         self.arrays: dict[str, Vector] = {
@@ -189,7 +189,7 @@ class Evaluation:
 
     # values -------------------------------------------------------------------------------------
 
-    def run(self, operations: Sequence[Operation], only: int | None = None) -> None:
+    def run(self, operations: Sequence[StepOperation], only: int | None = None) -> None:
         """Compute these operations at all points, or only one."""
         rows = self.rows if only is None else self.rows[only : only + 1]
         for o in operations:
@@ -210,7 +210,7 @@ class Evaluation:
                 except NOT_REAL:
                     row[s.slot] = None
 
-    def _special(self, s: Step, row: Row, q: int) -> Any:
+    def _special(self, s: ProgramStep, row: Row, q: int) -> Any:
         n = self.evaluator.arithmetic
         match s.name:
             case "input":
@@ -243,7 +243,7 @@ class Evaluation:
                 return self._matrix_function(s, [row[a] for a in s.args], q)
         return None
 
-    def _matrix_function(self, s: Step, entries: Vector, q: int) -> Vector:
+    def _matrix_function(self, s: ProgramStep, entries: Vector, q: int) -> Vector:
         """All results, row by row."""
         n = self.evaluator.arithmetic
         if s.name == "exponential":
@@ -273,7 +273,7 @@ class Evaluation:
             return sum(number(b[index]) * p for b, p in pairs)
         return self.arrays[array][index]
 
-    def _terms(self, s: Step, row: Row, q: int) -> Number:
+    def _terms(self, s: ProgramStep, row: Row, q: int) -> Number:
         """Reduction over the terms of run-time arrays."""
         entries, value, kind, numbers = s.content
         number = self.evaluator.arithmetic.number
@@ -295,14 +295,14 @@ class Evaluation:
             return n.product(s.slot, len(terms))(*terms)
         return (min if kind == "minimum" else max)(terms)
 
-    def _integral(self, s: Step) -> Number:
+    def _integral(self, s: ProgramStep) -> Number:
         n = self.evaluator.arithmetic
         weights = [n.number(point[-1]) for point in self.state.rule]
         terms = [row[s.args[0]] * w for row, w in zip(self.rows, weights, strict=True)]
         return n.sum(s.slot, len(terms))(*terms)
 
     def _with(
-        self, s: Step, q: int, slots: Sequence[int], values: Vector, results: Sequence[int]
+        self, s: ProgramStep, q: int, slots: Sequence[int], values: Vector, results: Sequence[int]
     ) -> Vector:
         """Values of `results` if `slots` of point q have other values, by the inner operations."""
         inner = self.evaluator.inner(s)
@@ -326,7 +326,7 @@ class Evaluation:
                 for k, v in zip(slots, restored, strict=True):
                     row[k] = v
 
-    def _slope(self, s: Step, q: int) -> Number:
+    def _slope(self, s: ProgramStep, q: int) -> Number:
         value, by = s.args
         if value == by:
             return self.evaluator.arithmetic.number(1)
@@ -366,7 +366,7 @@ class Evaluation:
 
     # local equations ----------------------------------------------------------------------------
 
-    def _solve(self, s: Step, row: Row, q: int) -> Vector:
+    def _solve(self, s: ProgramStep, row: Row, q: int) -> Vector:
         unknowns, equations = s.content
         n = self.evaluator.arithmetic
 
@@ -458,7 +458,7 @@ class ReferenceTasks:
     """
 
     @_in_digits
-    def __init__(self, evaluator: Evaluator, state: State) -> None:
+    def __init__(self, evaluator: Evaluator, state: EvaluationState) -> None:
         self.evaluator, self.state = evaluator, state
         self.program = evaluator.program
         self.base = evaluator.at(state)

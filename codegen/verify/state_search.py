@@ -19,7 +19,7 @@ from itertools import groupby
 from time import perf_counter
 from typing import Any
 
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.verify.arithmetics import Doubles
 from softehl.codegen.verify.reference_evaluator import Evaluator, OutOfTimeError
@@ -45,7 +45,7 @@ Slopes = list[tuple[list[float], list[list[float]]]]
 class ProbedState:
     """A state with real values and the targets that it meets."""
 
-    state: State
+    state: EvaluationState
     values: list[list[float]]
     meets: set[Target]
 
@@ -55,7 +55,7 @@ class StateSearch:
     """Far and steered states of one model, from an ordinary one."""
 
     program: Program
-    nominal: Sequence[State]
+    nominal: Sequence[EvaluationState]
     unreal: int = 0
     late: bool = False
     missing: list[Target] = field(default_factory=list)
@@ -66,7 +66,7 @@ class StateSearch:
         self.rng = random.Random(f"{self.d.name} far")
         self.pool: list[ProbedState] = []
 
-    def states(self, seconds: float) -> Iterator[State]:
+    def states(self, seconds: float) -> Iterator[EvaluationState]:
         """States in the order in which they are worth comparing; so long is searched at most."""
         self.evaluator.deadline = perf_counter() + seconds
         probed = [f for s in self.nominal[:1] if (f := self.probe(s))]
@@ -98,7 +98,7 @@ class StateSearch:
 
     # probing ------------------------------------------------------------------------------------
 
-    def probe(self, state: State) -> ProbedState | None:
+    def probe(self, state: EvaluationState) -> ProbedState | None:
         """The state in doubles; None without real values, or if the model forbids it."""
         self.late = self.late or perf_counter() > self.evaluator.deadline
         if self.late or not _allowed(self.d, state):
@@ -137,7 +137,7 @@ class StateSearch:
             else:
                 self.pool.append(probed)
 
-    def _far(self, k: int) -> State:
+    def _far(self, k: int) -> EvaluationState:
         """The k-th far state: modes in turn, at scales that fill 1e-3 to 1e3 evenly."""
         base = self.nominal[k % len(self.nominal)]
         scale = 10 ** (6 * (k * 0.6180339887 % 1) - 3)
@@ -159,11 +159,11 @@ class StateSearch:
         names = self.d.unknowns
         return abs(float(value)) if k < len(names) and names[k] in dict(self.d.example) else 1.0
 
-    def _random(self, s: State, scale: float) -> list[float]:
+    def _random(self, s: EvaluationState, scale: float) -> list[float]:
         pairs = enumerate(s.dofs)
         return [v + scale * (self._size(k, v) or 1) * self.rng.uniform(-1, 1) for k, v in pairs]
 
-    def _linear(self, s: State, scale: float) -> list[float]:
+    def _linear(self, s: EvaluationState, scale: float) -> list[float]:
         """Unknowns of one name as a linear field over the nodes."""
         width = len(self.d.coordinates)
         extent = max(
@@ -185,7 +185,7 @@ class StateSearch:
             out.append(v + (self._size(k, v) or 1) * (first + moved))
         return out
 
-    def _one_argument(self, s: State, k: int) -> State:
+    def _one_argument(self, s: EvaluationState, k: int) -> EvaluationState:
         count = len(s.parameters) + len(s.data) + sum(map(len, s.point_data))
         factors = [1.0] * count
         if count:
@@ -193,7 +193,7 @@ class StateSearch:
             factors[k % count] = sign * 10 ** self.rng.uniform(-3, 3)
         return _scaled(s, factors)
 
-    def _arguments(self, s: State, *, signs: bool) -> State:
+    def _arguments(self, s: EvaluationState, *, signs: bool) -> EvaluationState:
         count = len(s.parameters) + len(s.data) + sum(map(len, s.point_data))
         draw = [10 ** self.rng.uniform(-3, 3) for _ in range(count)]
         return _scaled(s, [f * (self.rng.choice((-1, 1)) if signs else 1) for f in draw])
@@ -241,7 +241,7 @@ class StateSearch:
                 out.append((direction, change))
         return out
 
-    def _directions(self, s: State) -> Iterator[list[float]]:
+    def _directions(self, s: EvaluationState) -> Iterator[list[float]]:
         """Every unknown of one name together, then every argument alone."""
         base, first = _flat(s), len(s.coordinates)
         count = len(s.dofs)
@@ -307,7 +307,7 @@ class StateSearch:
             above = c.values[number][0] > 0
             a, b = (c, b) if (a.values[number][0] > 0) == above else (a, c)
 
-    def _near_conditions(self, pool: Sequence[ProbedState]) -> Iterator[State]:
+    def _near_conditions(self, pool: Sequence[ProbedState]) -> Iterator[EvaluationState]:
         """On both sides of every condition, close to it."""
         for k, switch in enumerate(self.program.switches):
             sides: dict[bool, ProbedState] = {}
@@ -348,7 +348,7 @@ def _sides(switch: Switch, values: Sequence[float]) -> Iterator[str]:
 _RELATIONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 
 
-def _allowed(d: Definition, s: State) -> bool:
+def _allowed(d: Definition, s: EvaluationState) -> bool:
     """True if the conditions of the model on parameters and data hold."""
     named = {a.name: [v] for a, v in zip(d.parameters, s.parameters, strict=True)}
     named |= {a.name: [v] for a, v in zip(d.data, s.data, strict=True)}
@@ -356,7 +356,7 @@ def _allowed(d: Definition, s: State) -> bool:
     return all(_RELATIONS[c.relation](v, c.bound) for c in d.conditions for v in named[c.name])
 
 
-def _scaled(s: State, factors: Sequence[float]) -> State:
+def _scaled(s: EvaluationState, factors: Sequence[float]) -> EvaluationState:
     """Parameters, data and data of points times factors."""
     remaining = iter(factors)
     parameters = [v * next(remaining) for v in s.parameters]
@@ -365,12 +365,12 @@ def _scaled(s: State, factors: Sequence[float]) -> State:
     return replace(s, parameters=parameters, data=data, point_data=points)
 
 
-def _flat(s: State) -> list[float]:
+def _flat(s: EvaluationState) -> list[float]:
     rows = [v for row in s.point_data for v in row]
     return [float(v) for v in (*s.coordinates, *s.dofs, *s.data, *s.parameters, *rows)]
 
 
-def _state(like: State, values: Sequence[float]) -> State:
+def _state(like: EvaluationState, values: Sequence[float]) -> EvaluationState:
     """A state of the same shape."""
     remaining = list(values)
 

@@ -18,14 +18,14 @@ from sympy.logic.boolalg import BooleanAtom
 
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.sympy_tape import (
-    External,
+    ExternalResult,
+    FunctionResult,
     Implicit,
     Integral,
     Local,
     MatrixFunction,
     OfArray,
     Principal,
-    Result,
     Slope,
     SympyTape,
     Terms,
@@ -36,7 +36,7 @@ ARRAYS = ("coordinates", "dofs", "data", "parameters", "arrays")
 
 
 @dataclass(frozen=True)
-class Step:
+class ProgramStep:
     """One operation.
 
     name: what is done with the operands in the slots `args`; content: what else it needs.
@@ -52,7 +52,7 @@ class Step:
     varying: bool
     depends: frozenset[str]
     locals: frozenset[int]
-    inner: tuple[Step, ...] = ()
+    inner: tuple[ProgramStep, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,8 @@ class Program:
     """
 
     definition: Definition
-    steps: list[Step] = field(default_factory=list)
-    main: list[Step] = field(default_factory=list)
+    steps: list[ProgramStep] = field(default_factory=list)
+    main: list[ProgramStep] = field(default_factory=list)
     potentials: list[tuple[int, tuple[int, ...]]] = field(default_factory=list)
     fields: list[int] = field(default_factory=list)
     updates: list[int] = field(default_factory=list)
@@ -91,7 +91,7 @@ class Program:
                     slots.add(s.content[1])
         return slots
 
-    def above(self, roots: Iterable[int]) -> list[Step]:
+    def above(self, roots: Iterable[int]) -> list[ProgramStep]:
         """The operations of `main` that `roots` need, in order."""
         needed = _needed(self.steps, roots)
         return [s for s in self.main if s.slot in needed]
@@ -133,7 +133,7 @@ class _Builder:
 
     def __init__(self, record: SympyTape) -> None:
         self.record = record
-        self.steps: list[Step] = []
+        self.steps: list[ProgramStep] = []
         self.switches: list[Switch] = []
         self._slots: dict[Any, int] = {}
 
@@ -171,9 +171,9 @@ class _Builder:
                 parts = (*meaning.entries, sp.sympify(meaning.value), *meaning.amounts)
             case OfArray():
                 parts = (meaning.amount, *meaning.args)
-            case External():
+            case ExternalResult():
                 parts = meaning.inputs
-            case Result():
+            case FunctionResult():
                 parts = (*meaning.of.function, *meaning.of.entries)
             case Slope():
                 parts = (meaning.value, meaning.by)
@@ -231,12 +231,12 @@ class _Builder:
             case OfArray():
                 number = self.record.inputs[m.amount][1]
                 return self._add("of array", self._at(m.amount, *m.args), (m.layout, number))
-            case External():
+            case ExternalResult():
                 key = ("external", m.function, m.inputs)
                 if key not in self._slots:
                     self._slots[key] = self._add("external", self._at(*m.inputs), m.function)
                 return self._add("item", (self._slots[key],), m.index)
-            case Result():
+            case FunctionResult():
                 return self._add("item", (self._matrix_function(m.of),), m.index)
             case Slope():
                 (value,), (by,) = self._at(m.value), self._at(m.by)
@@ -257,7 +257,7 @@ class _Builder:
     def _matrix_function(self, m: MatrixFunction) -> int:
         if m not in self._slots:
             entries = self._at(*m.entries)
-            inner: tuple[Step, ...] = ()
+            inner: tuple[ProgramStep, ...] = ()
             content: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())
             if m.function:
                 (eigenvalue, f) = self._at(*m.function)
@@ -311,7 +311,7 @@ class _Builder:
         *,
         varying: bool | None = None,
         depends: Iterable[str] = (),
-        inner: tuple[Step, ...] = (),
+        inner: tuple[ProgramStep, ...] = (),
     ) -> int:
         slot = len(self.steps)
         local_unknowns: set[int] = {slot} if name == "local" else set()
@@ -326,10 +326,12 @@ class _Builder:
         locals_ = frozenset(local_unknowns | {k for s in below for k in s.locals} - hidden)
         dependencies = frozenset(depends) | {x for s in below for x in s.depends}
         varies = any(s.varying for s in below) if varying is None else varying
-        self.steps.append(Step(slot, name, args, content, varies, dependencies, locals_, inner))
+        self.steps.append(
+            ProgramStep(slot, name, args, content, varies, dependencies, locals_, inner)
+        )
         return slot
 
-    def _between(self, sources: Sequence[int], roots: Sequence[int]) -> tuple[Step, ...]:
+    def _between(self, sources: Sequence[int], roots: Sequence[int]) -> tuple[ProgramStep, ...]:
         """Operations by which `roots` depend on `sources`, in order."""
         needed = _needed(self.steps, roots)
         allowed = set(sources) | {k for r in roots for k in self.steps[r].locals}
@@ -341,7 +343,9 @@ class _Builder:
         return tuple(self.steps[k] for k in sorted(reached - set(sources)))
 
 
-def _needed(steps: Sequence[Step], roots: Iterable[int], stop: Iterable[int] = ()) -> set[int]:
+def _needed(
+    steps: Sequence[ProgramStep], roots: Iterable[int], stop: Iterable[int] = ()
+) -> set[int]:
     """Slots of all operations below `roots`, and they themselves; none below `stop`."""
     needed: set[int] = set(stop)
     waiting = list(roots)

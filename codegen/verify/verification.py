@@ -34,8 +34,8 @@ from typing import Any
 from softehl.codegen import abi
 from softehl.codegen.derive.task_outputs import outputs
 from softehl.codegen.graph.differentiation import gradient
-from softehl.codegen.graph.evaluation import State
-from softehl.codegen.graph.graph import Input
+from softehl.codegen.graph.evaluation import EvaluationState
+from softehl.codegen.graph.graph import InputEntry
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.verify import random_states
 from softehl.codegen.verify.arithmetics import Exact, Rounded
@@ -120,7 +120,7 @@ class Comparison:
         self.moving: set[int] = set()
         self.size = 0
 
-    def batch(self, states: Sequence[State]) -> Batch:
+    def batch(self, states: Sequence[EvaluationState]) -> Batch:
         """The kernels on some states, each with a random direction without zeros."""
         self.size = len(states[0].dofs)
         along = [self._direction() for _ in states]
@@ -129,7 +129,7 @@ class Comparison:
     def _direction(self) -> Vector:
         return [self.rng.choice((-1, 1)) * self.rng.uniform(0.5, 1) for _ in range(self.size)]
 
-    def ordinary(self, states: Sequence[State], tasks: Sequence[str]) -> None:
+    def ordinary(self, states: Sequence[EvaluationState], tasks: Sequence[str]) -> None:
         """The last state, in the remainder of a batch, and of small elements the first one, too.
 
         At once with all rows added, so that every task is met early, then row by row.
@@ -140,7 +140,9 @@ class Comparison:
         for e in indices:
             self._at(called, e, self._combs(), tasks, far=False)
 
-    def far(self, state: State, others: Sequence[State], tasks: Sequence[str]) -> None:
+    def far(
+        self, state: EvaluationState, others: Sequence[EvaluationState], tasks: Sequence[str]
+    ) -> None:
         """A state first and last in a batch, others of the same parameters between."""
         between = [replace(s, parameters=state.parameters) for s in others[2:]]
         called = self.batch([state, *between, state])
@@ -283,7 +285,7 @@ class _View:
             case abi.Task.PSEUDO_LOAD:
                 return page.pseudo_load(self._variation(task), self.left)
         node = dict(self.d.derivatives)[task.removeprefix("d_")]
-        assert isinstance(node.payload, Input)
+        assert isinstance(node.payload, InputEntry)
         array, index = node.payload.array, node.payload.index
         unit = [float(k == index) for k in range(len(getattr(page.state, array)))]
         return page.rate(array, unit, self.left)

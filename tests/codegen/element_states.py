@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.runtime.arrays import Array
 from softehl.runtime.discretisation.quadrature import Kind, facet_rule, film_rule
 from softehl.runtime.kernels.kernel import Kernel, Rule, load_kernel
@@ -50,12 +50,12 @@ class Case:
             "point_data": None if self.point_data is None else self.point_data[None],
         }
 
-    def exact(self, kernel: Kernel | None = None) -> State:
+    def exact(self, kernel: Kernel | None = None) -> EvaluationState:
         """The same doubles as arguments of the oracle."""
         rule = self.rule or (kernel or load_kernel(self.family)).default_rule
         table = np.column_stack([rule.points.reshape(len(rule.weights), -1), rule.weights])
         basis = () if rule.basis is None else rule.basis.tolist()
-        return State(
+        return EvaluationState(
             self.coordinates.tolist(),
             self.dofs.tolist(),
             self.data.tolist(),

@@ -22,7 +22,7 @@ from softehl.codegen.derive import task_outputs
 from softehl.codegen.derive.multilevel_chain_rule import Linearisation
 from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.differentiation import gradient
-from softehl.codegen.graph.evaluation import State, evaluate
+from softehl.codegen.graph.evaluation import EvaluationState, evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.partial_derivatives import DifferentiationError
 from softehl.codegen.language.definition import Definition
@@ -281,8 +281,8 @@ def bar(*, interface: bool, summed: bool = False) -> Definition:
     return m.finish()
 
 
-def bar_state() -> State:
-    return State((0, 0), ("0.13", "-0.2", "0.35"), (), ("2.5",), RULE)
+def bar_state() -> EvaluationState:
+    return EvaluationState((0, 0), ("0.13", "-0.2", "0.35"), (), ("2.5",), RULE)
 
 
 def matrices_agree(a: Any, b: Any, tolerance: float = 1e-28) -> bool:
@@ -291,7 +291,7 @@ def matrices_agree(a: Any, b: Any, tolerance: float = 1e-28) -> bool:
     return all(close(x, y, tolerance) for p, q in rows for x, y in zip(p, q, strict=True))
 
 
-def exact(d: Definition, state: State) -> tuple[Any, Any]:
+def exact(d: Definition, state: EvaluationState) -> tuple[Any, Any]:
     oracle = Oracle(d)
     return oracle.residual(state), oracle.tangent(state)
 
@@ -315,7 +315,7 @@ def pseudo(*, frozen: bool) -> Definition:
 
 
 def test_pseudo_potentials_freeze_in_the_residual_and_not_in_the_tangent() -> None:
-    state = State((0, 0), ("0.4", "-0.3"), (), (), RULE)
+    state = EvaluationState((0, 0), ("0.4", "-0.3"), (), (), RULE)
     free, frozen = pseudo(frozen=False), pseudo(frozen=True)
     assert free.conservative
     assert not frozen.conservative
@@ -355,7 +355,7 @@ def test_a_mean_of_an_interpolated_field_may_not_enter_a_sum_again() -> None:
 
 def test_a_wrong_tangent_graph_is_detected() -> None:
     """The comparison that these tests rest on refuses one entry off by 1e-20, or transposed."""
-    d, state = pseudo(frozen=True), State((0, 0), ("0.4", "-0.3"), (), (), RULE)
+    d, state = pseudo(frozen=True), EvaluationState((0, 0), ("0.4", "-0.3"), (), (), RULE)
     R, K = exact(d, state)
     assert matrices_agree((R, K), (R, K))
     with mpmath.workdps(50):

@@ -16,7 +16,7 @@ from softehl.codegen.elements import quadrature
 from softehl.codegen.graph.differentiation import gradient
 from softehl.codegen.graph.evaluation import evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.routines import Newton, inverse
+from softehl.codegen.graph.routines import NewtonRoutine, inverse
 from softehl.codegen.graph.traversal import reachable
 from softehl.codegen.graph.verifier import IllegalGraphError, check
 from softehl.codegen.language.definition import Definition
@@ -112,7 +112,7 @@ def test_a_forgotten_dependence_of_the_equation_is_refused(tmp_path: Path) -> No
     d = coupled(1, unroll=False)
     (call,) = (n for n in reachable([d.potential]) if n.op is Op.CALL)
     routine = call.payload
-    assert isinstance(routine, Newton)
+    assert isinstance(routine, NewtonRoutine)
     spoilt = (d.graph.zero,) * len(routine.by_external[0])
     object.__setattr__(routine, "by_external", (spoilt,))
     kernel = compiled(d, tmp_path)

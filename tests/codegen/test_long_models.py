@@ -11,7 +11,7 @@ import sympy as sp
 
 from softehl.codegen import pipeline
 from softehl.codegen.elements import quadrature
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.graph.graph import Graph
 from softehl.codegen.graph.traversal import Recursion, recursion
 from softehl.codegen.language.definition import Definition
@@ -21,7 +21,7 @@ from softehl.codegen.language.sympy_lowering import Lowering
 from softehl.codegen.verify.graph_oracle import Oracle
 from tests.codegen.workshop import compiled
 
-STATE = State((), (0.7, -0.4))
+STATE = EvaluationState((), (0.7, -0.4))
 
 
 def chain(names: int, *tasks: str) -> Definition:

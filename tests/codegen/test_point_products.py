@@ -13,7 +13,7 @@ import sympy as sp
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Task
 from softehl.codegen.derive import point_products
-from softehl.codegen.derive.output_entries import Array
+from softehl.codegen.derive.output_entries import OutputArray
 from softehl.codegen.elements import quadrature
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.model import Model
@@ -123,7 +123,7 @@ def test_the_tangent_is_the_one_written_out(
 def test_the_fewest_values_are_found() -> None:
     """e and its parts: three slopes and t, or e, k and t."""
     function = pipeline.compile_task(beam("few", conservative).finish(), Task.TANGENT)
-    slopes = {x.row.position for x in function.best.entries if x.array is Array.SLOPES}
+    slopes = {x.row.position for x in function.best.entries if x.array is OutputArray.SLOPES}
     assert function.best.rule == "products at the points"
     assert len(slopes) == 4
 

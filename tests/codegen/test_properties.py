@@ -23,8 +23,8 @@ from softehl.codegen.abi import Target, Task
 from softehl.codegen.derive import task_outputs
 from softehl.codegen.emit.code_motion import If, Same, Schedule, Statement, schedule
 from softehl.codegen.emit.instruction_scheduling import order_plan
-from softehl.codegen.graph.evaluation import State
-from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.graph.evaluation import EvaluationState
+from softehl.codegen.graph.graph import Graph, InputEntry, Node, Op
 from softehl.codegen.graph.precise_arithmetic import number
 from softehl.codegen.graph.traversal import rewrite
 from softehl.codegen.graph.verifier import check
@@ -196,17 +196,17 @@ def test_the_meaning_is_its_own_difference_quotient() -> None:
 # --------------------------------------------------------------------------- graphs: passes, order
 
 
-def cases() -> Iterator[tuple[str, Definition, State]]:
+def cases() -> Iterator[tuple[str, Definition, EvaluationState]]:
     """A third of the models, each at a state where it has a value."""
     for name in [n for n in population() if exact(n)][::3]:
         *dofs, k = exact(name)[0]["state"]
         with mpmath.workdps(90):
             third = 1 / mpmath.sqrt(3)
             rule = ((-third, 1), (third, 1))
-        yield name, population()[name].definition(name), State((), dofs, (), [k], rule)
+        yield name, population()[name].definition(name), EvaluationState((), dofs, (), [k], rule)
 
 
-def values(d: Definition, roots: Sequence[Node], state: State) -> list[list[Any]]:
+def values(d: Definition, roots: Sequence[Node], state: EvaluationState) -> list[list[Any]]:
     return [at_points(d, r, state) if r.varying else [value(d, r, state)] for r in roots]
 
 
@@ -262,7 +262,7 @@ def test_a_wrong_pass_is_refused() -> None:
 class _Machine:
     """Executes a plan statement by statement; reading what is not stored yet is a KeyError."""
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: EvaluationState) -> None:
         self.state = state
         self.store: dict[Node, Any] = {}
         self.point: Sequence[Any] = ()
@@ -272,7 +272,7 @@ class _Machine:
             return mpmath.mpf(n.value.numerator) / n.value.denominator
         if n.op is Op.PI:
             return +mpmath.pi
-        if isinstance(n.payload, Input):
+        if isinstance(n.payload, InputEntry):
             array: Any = {"dofs": self.state.dofs, "parameters": self.state.parameters}
             source = self.point if n.payload.array == "rule" else array[n.payload.array]
             return mpmath.mpf(source[n.payload.index])
@@ -304,7 +304,7 @@ class _Machine:
                 self.store = {**kept, **sums}  # nothing of a turn is left for the next
 
 
-def executed(plan: Schedule, roots: Sequence[Node], state: State) -> list[list[Any]]:
+def executed(plan: Schedule, roots: Sequence[Node], state: EvaluationState) -> list[list[Any]]:
     with mpmath.workdps(DIGITS):
         machine = _Machine(state)
         machine.run(plan)
@@ -328,7 +328,7 @@ def test_a_wrong_order_is_refused() -> None:
     x = g.input("dofs", 0)
     root = g.mul(g.call(Op.EXP, g.call(Op.SIN, x)), x)
     plan = schedule([root])
-    state = State((), ["0.3"])
+    state = EvaluationState((), ["0.3"])
     assert executed(plan, [root], state)
     first, second, *_ = plan.stages[0].preamble
     plan.stages[0].preamble[:2] = [second, first]

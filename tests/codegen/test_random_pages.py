@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.elements import quadrature
-from softehl.codegen.graph.evaluation import State, Walk
+from softehl.codegen.graph.evaluation import EvaluationState, Walk
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.model import Model
@@ -356,7 +356,7 @@ def test_sympy_and_the_model_differentiate_alike(a: Any, b: Any, w: Any, by: str
         raise
     ours = m._lower(m.derivative("slope", W, s))
     with mpmath.workdps(50):
-        walk = Walk(State((), AT), {})
+        walk = Walk(EvaluationState((), AT), {})
         try:
             found, expected = walk.value(theirs), walk.value(ours)
             smooth = abs(found) < 1e30

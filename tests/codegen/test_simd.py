@@ -18,7 +18,7 @@ import sympy as sp
 from softehl.codegen import c_compiler, pipeline
 from softehl.codegen.elements import quadrature
 from softehl.codegen.emit import c_source
-from softehl.codegen.graph.evaluation import State
+from softehl.codegen.graph.evaluation import EvaluationState
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build
@@ -152,7 +152,7 @@ SAID: dict[tuple[str, str], Any] = {}
 """What the oracle says, which is the same for any number of lanes."""
 
 
-def said(d: Definition, at: State, w: tuple[float, ...]) -> Any:
+def said(d: Definition, at: EvaluationState, w: tuple[float, ...]) -> Any:
     """Energy, residual, tangent times w and fields of an element."""
     key = d.name, repr((at, w))
     if key not in SAID:

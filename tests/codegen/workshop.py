@@ -13,8 +13,8 @@ import numpy as np
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Task
 from softehl.codegen.derive import task_outputs
-from softehl.codegen.derive.output_entries import Slot
-from softehl.codegen.graph.evaluation import State, evaluate
+from softehl.codegen.derive.output_entries import OutputSlot
+from softehl.codegen.graph.evaluation import EvaluationState, evaluate
 from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import build, output_files
@@ -62,17 +62,17 @@ def difference(root: Node, at: Inputs, k: int) -> Number:
 # ------------------------------------------------------------------------------------------ models
 
 
-def value(d: Definition, node: Node, state: State) -> Number:
+def value(d: Definition, node: Node, state: EvaluationState) -> Number:
     """Value of a node that does not vary with the point."""
     return Oracle(replace(d, potential=node)).potential(state)
 
 
-def at_points(d: Definition, node: Node, state: State) -> list[Number]:
+def at_points(d: Definition, node: Node, state: EvaluationState) -> list[Number]:
     """Values of a node at the points of `state.rule`."""
     return [row[0] for row in Oracle(replace(d, fields=(("it", node),))).fields(state)]
 
 
-def linearised(d: Definition, state: State) -> tuple[list[Number], list[list[Number]]]:
+def linearised(d: Definition, state: EvaluationState) -> tuple[list[Number], list[list[Number]]]:
     """Residual and tangent that the *unoptimised* output graphs of a model say, without any C."""
     ndof = len(state.dofs)
     with mpmath.workdps(90):
@@ -91,7 +91,7 @@ def linearised(d: Definition, state: State) -> tuple[list[Number], list[list[Num
 Shape = list[Number] | None
 
 
-def _shapes(d: Definition, slot: Slot, state: State) -> list[tuple[int, Shape]]:
+def _shapes(d: Definition, slot: OutputSlot, state: EvaluationState) -> list[tuple[int, Shape]]:
     """Unknowns behind a slot with the value of their shape function at every point."""
     if not slot.basis:
         return [(slot.position, None)]
@@ -102,7 +102,9 @@ def _shapes(d: Definition, slot: Slot, state: State) -> list[tuple[int, Shape]]:
     ]
 
 
-def _contracted(d: Definition, node: Node, state: State, shapes: Sequence[Shape]) -> Number:
+def _contracted(
+    d: Definition, node: Node, state: EvaluationState, shapes: Sequence[Shape]
+) -> Number:
     if all(s is None for s in shapes):
         return value(d, node, state)
     values = at_points(d, node, state)
@@ -125,7 +127,7 @@ def compiled(d: Definition, directory: Path, level: str = "-O1") -> Kernel:
     return load_kernel(d.name, directory)
 
 
-def element_state(kernel: Kernel, coordinates: Any, dofs: Any, **given: Any) -> State:
+def element_state(kernel: Kernel, coordinates: Any, dofs: Any, **given: Any) -> EvaluationState:
     """One element's arguments for the oracle, from those of the kernel's methods."""
     rule = given.get("rule") or kernel.default_rule
     table = np.column_stack([rule.points.reshape(len(rule.weights), -1), rule.weights])
@@ -139,7 +141,7 @@ def element_state(kernel: Kernel, coordinates: Any, dofs: Any, **given: Any) -> 
         rows, history = rows[:, : len(kernel.point_data)], rows[:, len(kernel.point_data) :]
         ends = np.cumsum([of[array] for _, array in kernel.term_history])[:-1]
         terms = [[part.tolist() for part in np.split(row, ends)] for row in history]
-    return State(
+    return EvaluationState(
         np.ravel(coordinates).tolist(),
         np.ravel(dofs).tolist(),
         np.ravel(given.get("data", ())).tolist(),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from softehl.codegen.emit.points.point_layout import Layout
+from softehl.codegen.emit.points.point_layout import PointLayout
 from softehl.codegen.language.definition import Component
 
 THREADS = 256
@@ -53,7 +53,7 @@ def node_of(f: Nodal, name: str) -> str:
 class BlockSizes:
     """Sizes of a layout."""
 
-    layout: Layout
+    layout: PointLayout
 
     @cached_property
     def components(self) -> list[Component]:

@@ -56,15 +56,15 @@ from softehl.codegen.emit.points.btab import Parent, pull_back
 from softehl.codegen.emit.points.c_lines import Lines
 from softehl.codegen.emit.points.loop_nest import Frame
 from softehl.codegen.emit.points.point_function import PointOutputs
-from softehl.codegen.emit.points.point_layout import Layout, Needs
-from softehl.codegen.emit.points.sum_factored_product import Table, lagrange, sweep
+from softehl.codegen.emit.points.point_layout import Needs, PointLayout
+from softehl.codegen.emit.points.sum_factored_product import SymmetricTable, lagrange, sweep
 from softehl.codegen.graph.graph import Routine
-from softehl.codegen.language.definition import Quantity, functions_of_user
+from softehl.codegen.language.definition import PointQuantity, functions_of_user
 
 Part = tuple[PointOutputs, Schedule, tuple[Routine, ...]]
 
 
-def require(layout: Layout) -> None:
+def require(layout: PointLayout) -> None:
     """Raise `TargetError` for a page that a device cannot run."""
     d, name = layout.d, layout.d.name
     if not sum_factored_product.has_lines(layout):
@@ -191,8 +191,8 @@ class DeviceKernels(BlockSizes):
         """Tables and functions in front of the kernels."""
         stem, tables = self.layout.d.name, self.tables
         orders = sorted({self.n - 1, *(f.order for f in self.fields)})
-        lines = {f"to{order}": Table(self._shape(order)[0], 1) for order in orders}
-        lines["slope"] = Table(tables["slope"], -1)
+        lines = {f"to{order}": SymmetricTable(self._shape(order)[0], 1) for order in orders}
+        lines["slope"] = SymmetricTable(tables["slope"], -1)
         texts = [
             one_lane(sweep(f"{abi.function_name(stem, label)}_{kind}", table, kind))
             for label, table in lines.items()
@@ -462,7 +462,7 @@ class DeviceKernels(BlockSizes):
         places = {q: f"P[{k}]" for k, q in enumerate(self.layout.form.unknowns)}
         out.add("const V volume = failed ? (V)NAN : w;")
         for k, c in enumerate(self.components):
-            value = places.get(Quantity(c, None))
+            value = places.get(PointQuantity(c, None))
             text = f"volume * {value}" if value else "0"
             out.add(f"s0[{k * self.elements * self.size} + at] = {text};")
             of_slopes = {q.axis: v for q, v in places.items() if q.component == c}
@@ -587,11 +587,11 @@ class DeviceKernels(BlockSizes):
                 out.add(f"f{label[column]} += s * d{label[row]};")
             out.close()
         for component, k in components.items():
-            of_value = label.get(Quantity(component, None))
+            of_value = label.get(PointQuantity(component, None))
             flux = f"f{of_value}" if of_value else "0"
             out.add(f"s0[{k * self.elements * self.size} + at] = {flux};")
             for m in range(self.D):
-                of_slope = label.get(Quantity(component, m))
+                of_slope = label.get(PointQuantity(component, m))
                 out.add(f"{self._slope(k, m)} = {f'f{of_slope}' if of_slope else '0'};")
         out.close()
         out.add("SYNC")
@@ -611,7 +611,9 @@ class DeviceKernels(BlockSizes):
         for c, k in ((c, k) for k, c in enumerate(self.components)):
             for a, b in combinations_with_replacement(axes, 2):
                 pairs = {(a, b), (b, a)}
-                numbers = [parent.number(Quantity(c, i), Quantity(c, j)) for i, j in pairs]
+                numbers = [
+                    parent.number(PointQuantity(c, i), PointQuantity(c, j)) for i, j in pairs
+                ]
                 terms = [f"from[{i * self.owners}]" for i in numbers if i is not None]
                 if terms:
                     groups.setdefault((a, b), []).append((k, " + ".join(terms)))

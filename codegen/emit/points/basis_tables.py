@@ -20,7 +20,7 @@ DIGITS = 40
 
 
 @dataclass(frozen=True)
-class Line:
+class LineTable:
     """Shape functions of a product along one direction.
 
     values: [point][node] of a line, derivatives too. node_indices: of every node of the cell its
@@ -33,7 +33,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Shape:
+class BasisTable:
     """Shape functions of an order: values [point][node], derivatives [point][node][direction].
 
     line: for cells that are products of lines, under a rule that is a product too. long: whether
@@ -43,7 +43,7 @@ class Shape:
     order: int
     values: tuple[tuple[float, ...], ...]
     derivatives: tuple[tuple[tuple[float, ...], ...], ...]
-    line: Line | None
+    line: LineTable | None
     long: bool = False
 
     @property
@@ -76,18 +76,18 @@ class Shape:
 
 
 @cache
-def shape(order: int, cell: Element, rule: QuadratureRule) -> Shape:
+def shape(order: int, cell: Element, rule: QuadratureRule) -> BasisTable:
     """Shape functions of a cell at the points of a rule."""
     line = _line(cell, rule)
     if cell.lines is not None and line is not None:
-        return Shape(order, *_products(line, cell.dimension), line, long=True)
+        return BasisTable(order, *_products(line, cell.dimension), line, long=True)
     values, derivatives = _evaluated(cell.shape, cell.gradient, rule.points, cell.dimension)
-    return Shape(order, values, derivatives, line)
+    return BasisTable(order, values, derivatives, line)
 
 
-def constant(points: int, dimension: int) -> Shape:
+def constant(points: int, dimension: int) -> BasisTable:
     """Shape function of a field that is constant in the cell."""
-    return Shape(0, ((1.0,),) * points, (((0.0,) * dimension,),) * points, None)
+    return BasisTable(0, ((1.0,),) * points, (((0.0,) * dimension,),) * points, None)
 
 
 def _evaluated(
@@ -108,7 +108,7 @@ def _evaluated(
     return tuple(values), tuple(derivatives)
 
 
-def _line(cell: Element, rule: QuadratureRule) -> Line | None:
+def _line(cell: Element, rule: QuadratureRule) -> LineTable | None:
     """The line that a cell of all products is made of, with the points of the rule along it."""
     sides = sorted({c for node in cell.nodes for c in node}, key=lambda c: (abs(c) != 1, c))
     count = round(len(rule.points) ** (1 / cell.dimension))
@@ -132,10 +132,10 @@ def _line(cell: Element, rule: QuadratureRule) -> Line | None:
         return [(sp.diff(v, x),) for v in lagrange(x)]
 
     values, derivatives = _evaluated(lagrange, slope, [(x,) for x in along], 1)
-    return Line(values, tuple(tuple(s for (s,) in row) for row in derivatives), node_indices)
+    return LineTable(values, tuple(tuple(s for (s,) in row) for row in derivatives), node_indices)
 
 
-def _products(line: Line, dimension: int) -> tuple[Any, Any]:
+def _products(line: LineTable, dimension: int) -> tuple[Any, Any]:
     """Values and derivatives of the products of a line's shape functions."""
     values, derivatives = [], []
     for point in product(range(len(line.values)), repeat=dimension):
@@ -150,7 +150,7 @@ def _products(line: Line, dimension: int) -> tuple[Any, Any]:
     return tuple(values), tuple(derivatives)
 
 
-def _derivative_table(name: str, line: Line) -> str:
+def _derivative_table(name: str, line: LineTable) -> str:
     """Table NAME of derivatives [point][node][direction] of products; the C compiler multiplies.
 
     For a cell of 27 nodes that is a twentieth of the text of the numbers.
@@ -183,7 +183,7 @@ def weights(name: str, rule: QuadratureRule) -> str:
     return _array(f"{name}_W", [float(sp.N(w, DIGITS)) for w in rule.weights])
 
 
-def pairs(name: str, first: Line, second: Line) -> str:
+def pairs(name: str, first: LineTable, second: LineTable) -> str:
     """Table NAME of products along a line, [point][node of first][node of second][4].
 
     Value by value, value by slope, slope by value, slope by slope.
@@ -200,7 +200,7 @@ def pairs(name: str, first: Line, second: Line) -> str:
     return _array(name, rows)
 
 
-def nodes(name: str, line: Line) -> str:
+def nodes(name: str, line: LineTable) -> str:
     """Table NAME of the node of every product of nodes along the directions."""
     size, D = len(line.values[0]), len(line.node_indices[0])
     at = {node: k for k, node in enumerate(line.node_indices)}

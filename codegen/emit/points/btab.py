@@ -15,11 +15,11 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
-from softehl.codegen.emit.points.basis_tables import Line
+from softehl.codegen.emit.points.basis_tables import LineTable
 from softehl.codegen.emit.points.c_lines import Lines
 from softehl.codegen.emit.points.point_function import PointOutputs
-from softehl.codegen.emit.points.point_layout import Layout
-from softehl.codegen.language.definition import Component, Quantity
+from softehl.codegen.emit.points.point_layout import PointLayout
+from softehl.codegen.language.definition import Component, PointQuantity
 
 STEM = "pairs_"
 """Beginning of the names of files that models share, and of what is in them."""
@@ -29,7 +29,7 @@ STEM = "pairs_"
 class Parent:
     """Moduli by values and parent gradients: the array S of a point."""
 
-    layout: Layout
+    layout: PointLayout
     outputs: PointOutputs
 
     @property
@@ -38,7 +38,7 @@ class Parent:
         return self.outputs.symmetric
 
     @cached_property
-    def moduli(self) -> dict[tuple[Quantity, Quantity], str]:
+    def moduli(self) -> dict[tuple[PointQuantity, PointQuantity], str]:
         """Moduli at the point by row and column, from the function of the point; both triangles."""
         q, by_pair = self.layout.form.cell_quantities, {}
         for k, (i, j) in enumerate(self.outputs.moduli):
@@ -50,7 +50,7 @@ class Parent:
         return by_pair
 
     @cached_property
-    def of_centroid(self) -> list[dict[Quantity, str]]:
+    def of_centroid(self) -> list[dict[PointQuantity, str]]:
         """Derivatives of fluxes by each value at the centroid; empty where all are zero."""
         q, columns = self.layout.form.cell_quantities, []
         numbers = {value: k for k, value in enumerate(self.layout.form.unknowns)}
@@ -61,30 +61,34 @@ class Parent:
         return columns if any(columns) else []
 
     @cached_property
-    def blocks(self) -> dict[tuple[Component, bool, Component, bool], list[tuple[Quantity, ...]]]:
+    def blocks(
+        self,
+    ) -> dict[tuple[Component, bool, Component, bool], list[tuple[PointQuantity, ...]]]:
         """Nonempty blocks of the moduli by component and whether it is a gradient."""
-        by_block: dict[tuple[Component, bool, Component, bool], list[tuple[Quantity, ...]]] = {}
+        by_block: dict[
+            tuple[Component, bool, Component, bool], list[tuple[PointQuantity, ...]]
+        ] = {}
         for row, column in self.moduli:
             key = (row.component, row.axis is not None, column.component, column.axis is not None)
             by_block.setdefault(key, []).append((row, column))
         return by_block
 
     @cached_property
-    def quantities(self) -> list[Quantity]:
+    def quantities(self) -> list[PointQuantity]:
         """Values and parent gradients of the components, in the order of the weak form."""
-        parent_quantities: dict[Quantity, None] = {}
+        parent_quantities: dict[PointQuantity, None] = {}
         for q in self.layout.form.cell_quantities.values():
             axes = [None] if q.axis is None else range(self.layout.dimension)
-            parent_quantities.update(dict.fromkeys(Quantity(q.component, k) for k in axes))
+            parent_quantities.update(dict.fromkeys(PointQuantity(q.component, k) for k in axes))
         order = {c: k for k, c in enumerate(self.layout.components)}
         return sorted(
             parent_quantities, key=lambda q: (order[q.component], -1 if q.axis is None else q.axis)
         )
 
     @cached_property
-    def numbers(self) -> dict[tuple[Quantity, Quantity], int]:
+    def numbers(self) -> dict[tuple[PointQuantity, PointQuantity], int]:
         """Indices in S of the nonzero entries."""
-        entry_numbers: dict[tuple[Quantity, Quantity], int] = {}
+        entry_numbers: dict[tuple[PointQuantity, PointQuantity], int] = {}
         for n, row in enumerate(self.quantities):
             for column in self.quantities[n if self.symmetric else 0 :]:
                 is_gradient = row.axis is not None, column.axis is not None
@@ -97,27 +101,27 @@ class Parent:
         """Entries of S at one point."""
         return max(len(self.numbers), 1)
 
-    def number(self, row: Quantity, column: Quantity) -> int | None:
+    def number(self, row: PointQuantity, column: PointQuantity) -> int | None:
         """Index in S of an entry of either triangle."""
         mirrored = (column, row) if self.symmetric else (row, column)
         return self.numbers.get((row, column), self.numbers.get(mirrored))
 
-    def of(self, c: Component) -> list[Quantity]:
+    def of(self, c: Component) -> list[PointQuantity]:
         """Value and parent gradient of a component."""
         return [q for q in self.quantities if q.component == c]
 
 
-def pull_back(out: Lines, layout: Layout, outputs: PointOutputs) -> None:
+def pull_back(out: Lines, layout: PointLayout, outputs: PointOutputs) -> None:
     """Write S of the point q: w T A T^T, where T turns gradients into parent gradients."""
     parent, D = Parent(layout, outputs), range(layout.dimension)
     for k in D:
         out.add(f"const V {', '.join(f'wI{k}{m} = w * I{k}{m}' for m in D)};")
         out.idle(f"wI{k}{m}" for m in D)
-    half: dict[tuple[Quantity, Quantity], str] = {}
+    half: dict[tuple[PointQuantity, PointQuantity], str] = {}
     for (row, column), n in parent.numbers.items():
         terms = []
         for axis in [None] if row.axis is None else D:
-            inner = Quantity(row.component, axis)
+            inner = PointQuantity(row.component, axis)
             value = _half(out, parent, half, inner, column)
             if value:
                 terms.append(f"w * {value}" if axis is None else f"wI{row.axis}{axis} * {value}")
@@ -127,15 +131,15 @@ def pull_back(out: Lines, layout: Layout, outputs: PointOutputs) -> None:
 def _half(
     out: Lines,
     parent: Parent,
-    half: dict[tuple[Quantity, Quantity], str],
-    row: Quantity,
-    column: Quantity,
+    half: dict[tuple[PointQuantity, PointQuantity], str],
+    row: PointQuantity,
+    column: PointQuantity,
 ) -> str:
     """Name of a modulus whose column is pulled back; empty where it is zero."""
     if (row, column) not in half:
         terms = []
         for axis in [None] if column.axis is None else range(parent.layout.dimension):
-            value = parent.moduli.get((row, Quantity(column.component, axis)))
+            value = parent.moduli.get((row, PointQuantity(column.component, axis)))
             if value:
                 terms.append(value if axis is None else f"{value} * I{column.axis}{axis}")
         name = f"H{len(half)}" if terms else ""
@@ -155,7 +159,7 @@ class Pair:
     """Whether rows and columns are the same and symmetric."""
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> PointLayout:
         return self.parent.layout
 
     @property
@@ -184,7 +188,7 @@ class Pair:
         out.add(f"k_lanes[({row}) * {size} + {column}] = {value};")
 
 
-def ranks(layout: Layout) -> list[tuple[Any, ...]]:
+def ranks(layout: PointLayout) -> list[tuple[Any, ...]]:
     """Ranks of the unknowns: of two mirrored entries that with the lower row is stored."""
     names = {c.name: c for c in layout.components}
     ranked = []
@@ -196,7 +200,7 @@ def ranks(layout: Layout) -> list[tuple[Any, ...]]:
     return ranked
 
 
-Columns = dict[tuple[Quantity, Component], int]
+Columns = dict[tuple[PointQuantity, Component], int]
 
 
 def assemble(out: Lines, pair: Pair) -> None:
@@ -220,7 +224,7 @@ def assemble(out: Lines, pair: Pair) -> None:
     out.close()
 
 
-def _factor(q: Quantity, node: str) -> str:
+def _factor(q: PointQuantity, node: str) -> str:
     """Variable with the shape function of a node, or its derivative."""
     return f"N{node}" if q.axis is None else f"D{node}{q.axis}"
 
@@ -285,7 +289,7 @@ def assemble_by_directions(out: Lines, pair: Pair) -> None:
     _Level(out, pair, pair.layout.dimension - 1, "S").write(values, alike=pair.half)
 
 
-def _both(pair: Pair) -> list[tuple[Quantity, Quantity]]:
+def _both(pair: Pair) -> list[tuple[PointQuantity, PointQuantity]]:
     rows = [q for q in pair.parent.quantities if q.component.order == pair.order[0]]
     columns = [q for q in pair.parent.quantities if q.component.order == pair.order[1]]
     return [(a, b) for a in rows for b in columns]
@@ -301,7 +305,7 @@ class _Level:
     source: str
 
     @property
-    def lines(self) -> list[Line]:
+    def lines(self) -> list[LineTable]:
         """Shape functions along a direction, of rows and of columns."""
         order_lines = [self.pair.layout.shape(order).line for order in self.pair.order]
         return [line for line in order_lines if line is not None]

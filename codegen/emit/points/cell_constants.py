@@ -7,10 +7,10 @@ from collections.abc import Callable
 from functools import partial
 
 from softehl.codegen.emit.points import basis_tables
-from softehl.codegen.emit.points.point_layout import Layout, orders
+from softehl.codegen.emit.points.point_layout import PointLayout, orders
 
 
-def used(layout: Layout, text: str, prefix: str = "") -> list[str]:
+def used(layout: PointLayout, text: str, prefix: str = "") -> list[str]:
     """The tables of the cell that a text names."""
     name, form = prefix + layout.tables, layout.form
     every = [*form.all, *form.data.values()]

@@ -27,11 +27,11 @@ from softehl.codegen.elements.element import Element
 from softehl.codegen.emit.c_printer import number
 from softehl.codegen.emit.code_motion import Schedule
 from softehl.codegen.emit.points import basis_tables, cell_constants, point_function, point_kernel
-from softehl.codegen.emit.points.basis_tables import Line, Shape
+from softehl.codegen.emit.points.basis_tables import BasisTable, LineTable
 from softehl.codegen.emit.points.btab import STEM, Parent, pull_back
 from softehl.codegen.emit.points.c_lines import Lines
 from softehl.codegen.emit.points.point_function import PointOutputs
-from softehl.codegen.emit.points.point_layout import Layout, Needs
+from softehl.codegen.emit.points.point_layout import Needs, PointLayout
 from softehl.codegen.language.definition import Component
 
 LOWER = {1: 1, 2: 1, 3: 1, 4: 2, 5: 1, 6: 2}
@@ -45,11 +45,11 @@ def lower_cell(cell: Element) -> Element:
 
 
 @dataclass(frozen=True, eq=False)
-class CoarseLayout(Layout):
+class CoarseLayout(PointLayout):
     """Unknowns of the next level at the points of a cell."""
 
     @classmethod
-    def of(cls, layout: Layout) -> CoarseLayout:
+    def of(cls, layout: PointLayout) -> CoarseLayout:
         """Of the layout of a cell."""
         names = list(dict.fromkeys(name for name, _ in layout.d.dof_nodes))
         nodes = range(len(lower_cell(ELEMENTS[layout.d.cell]).nodes))
@@ -57,7 +57,7 @@ class CoarseLayout(Layout):
         d = replace(layout.d, dof_nodes=dofs, unknowns=tuple(f"{n}{a + 1}" for n, a in dofs))
         return cls(d, layout.form)
 
-    def shape(self, order: int) -> Shape:
+    def shape(self, order: int) -> BasisTable:
         """Shape functions of the lower cell at the points of the cell itself."""
         return basis_tables.shape(order, lower_cell(ELEMENTS[self.d.cell]), self.d.rule)
 
@@ -69,7 +69,7 @@ class CoarseTangent:
     names: variables that the product keeps at a point.
     """
 
-    layout: Layout
+    layout: PointLayout
     outputs: PointOutputs
     plan: Schedule
     names: Sequence[str]
@@ -85,7 +85,7 @@ class CoarseTangent:
         return Parent(self.layout, self.outputs)
 
     @cached_property
-    def lower(self) -> Layout:
+    def lower(self) -> PointLayout:
         """Layout of the unknowns of the lower order."""
         return CoarseLayout.of(self.layout)
 
@@ -95,7 +95,7 @@ class CoarseTangent:
         return len(self.lower.d.unknowns)
 
     @property
-    def line(self) -> Line:
+    def line(self) -> LineTable:
         """Shape functions along a direction."""
         line = self.layout.geometry.line
         assert line is not None
@@ -173,8 +173,10 @@ class CoarseTangent:
     def _squares(self) -> list[str]:
         """Functions that add products along a line: of values, value and slope, slopes."""
         texts = []
-        values, slopes = self.line.values, self.line.derivatives
-        for kind, (first, second) in enumerate([(values, values), (values, slopes), (slopes,) * 2]):
+        values, derivatives = self.line.values, self.line.derivatives
+        for kind, (first, second) in enumerate(
+            [(values, values), (values, derivatives), (derivatives,) * 2]
+        ):
             lines = []
             for a in range(len(values[0])):
                 terms = [
@@ -212,8 +214,8 @@ class CoarseTangent:
         out.open(f"for (int k = 0; k < {nodes**D}; ++k)")
         out.add(f"const int a = {at}[k];")
         value = f"{total}[k]" if total else "softehl_splat(0.0)"
-        place = self.layout.entries(c).at("a")
-        out.add(f"softehl_store1(R + {place}, {len(self.layout.d.unknowns)}, {value});")
+        position = self.layout.entries(c).at("a")
+        out.add(f"softehl_store1(R + {position}, {len(self.layout.d.unknowns)}, {value});")
         out.close()
         out.close()
 
@@ -226,18 +228,18 @@ class CoarseTangent:
         blocks = nodes**axis
         summed: dict[tuple[int, ...], str] = {}
         for kinds, source in arrays.items():
-            rest = kinds[1:]
-            if rest not in summed:
-                summed[rest] = f"d{axis}{len(summed)}"
+            remaining = kinds[1:]
+            if remaining not in summed:
+                summed[remaining] = f"d{axis}{len(summed)}"
                 count = blocks * nodes * step
-                out.add(f"V {summed[rest]}[{count}];")
+                out.add(f"V {summed[remaining]}[{count}];")
                 out.add(f"for (int k = 0; k < {count}; ++k)")
-                out.add(f"    {summed[rest]}[k] = softehl_splat(0.0);")
+                out.add(f"    {summed[remaining]}[k] = softehl_splat(0.0);")
             out.add(f"for (int j = 0; j < {blocks}; ++j)")
             out.add(f"    for (int i = 0; i < {step}; ++i)")
             first, second = f"{points * step} * j + i", f"{nodes * step} * j + i"
+            target = summed[remaining]
             out.add(
-                f"        {self.name}_{kinds[0]}(&{source}[{first}], &{summed[rest]}[{second}], "
-                f"{step});"
+                f"        {self.name}_{kinds[0]}(&{source}[{first}], &{target}[{second}], {step});"
             )
         return summed

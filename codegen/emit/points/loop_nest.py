@@ -11,8 +11,8 @@ from softehl.codegen.emit.c_printer import design_width
 from softehl.codegen.emit.points import point_function
 from softehl.codegen.emit.points.c_lines import Lines
 from softehl.codegen.emit.points.point_function import PointOutputs
-from softehl.codegen.emit.points.point_layout import Layout, Needs, orders
-from softehl.codegen.language.definition import Component, Quantity
+from softehl.codegen.emit.points.point_layout import Needs, PointLayout, orders
+from softehl.codegen.language.definition import Component, PointQuantity
 
 
 class Frame:
@@ -23,7 +23,7 @@ class Frame:
     fluxes go to nodes. first_dof: unknowns in a variation come after so many entries.
     """
 
-    def __init__(self, layout: Layout, task: str, outputs: PointOutputs) -> None:
+    def __init__(self, layout: PointLayout, task: str, outputs: PointOutputs) -> None:
         self.layout, self.task, self.outputs = layout, task, outputs
         self.needs = Needs.of(outputs.entries)
         self.out = Lines()
@@ -97,12 +97,12 @@ def products(f: Frame) -> None:
         out.idle([f"N{order}", f"D{order}"])
 
 
-def components(quantities: Iterable[Quantity]) -> list[Component]:
+def components(quantities: Iterable[PointQuantity]) -> list[Component]:
     """Components of quantities, each once."""
     return list(dict.fromkeys(q.component for q in quantities))
 
 
-def to_nodes(f: Frame, fluxes: dict[Quantity, str], to: str, weight: str) -> None:
+def to_nodes(f: Frame, fluxes: dict[PointQuantity, str], to: str, weight: str) -> None:
     """Fluxes at the point q, pulled back to the parent cell, times their weight added at nodes."""
     out = f.out
     for order in orders(list(fluxes)):

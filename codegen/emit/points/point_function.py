@@ -8,10 +8,10 @@ from functools import cached_property
 
 from softehl.codegen import abi
 from softehl.codegen.abi import Task
-from softehl.codegen.derive.output_entries import Entry
+from softehl.codegen.derive.output_entries import OutputEntry
 from softehl.codegen.derive.point_outputs import RATES
 from softehl.codegen.emit.code_motion import If, Same, Schedule, Statement
-from softehl.codegen.emit.points.point_layout import Layout, Needs
+from softehl.codegen.emit.points.point_layout import Needs, PointLayout
 from softehl.codegen.emit.simd_printer import LanePrinter
 from softehl.codegen.graph.graph import FREE, Node
 
@@ -28,7 +28,7 @@ class PointOutputs:
     triangle alone. square: whether rows and columns are the same quantities.
     """
 
-    entries: Sequence[Entry]
+    entries: Sequence[OutputEntry]
     square: bool = True
 
     @cached_property
@@ -41,12 +41,12 @@ class PointOutputs:
         return all(nodes.get((j, i)) is n for (i, j), n in nodes.items())
 
     @property
-    def rows(self) -> list[Entry]:
+    def rows(self) -> list[OutputEntry]:
         """The outputs in P."""
         return [x for x in self.entries if x.column is None and x.row.position < RATES]
 
     @property
-    def rates(self) -> list[Entry]:
+    def rates(self) -> list[OutputEntry]:
         """Rates of fluxes, in A."""
         return [x for x in self.entries if x.column is None and x.row.position >= RATES]
 
@@ -72,12 +72,12 @@ def _is_zero(n: Node) -> bool:
     return n.op == "const" and n.value == 0
 
 
-def name(layout: Layout, task: str) -> str:
+def name(layout: PointLayout, task: str) -> str:
     """Name of the function."""
     return f"{abi.function_name(layout.d.name, task)}_{layout.place_of_points}"
 
 
-def text(layout: Layout, task: str, outputs: PointOutputs, plan: Schedule) -> tuple[str, int]:
+def text(layout: PointLayout, task: str, outputs: PointOutputs, plan: Schedule) -> tuple[str, int]:
     """C text of the function and the number of its temporaries.
 
     It returns the lanes in which a local iteration has failed.
@@ -93,7 +93,7 @@ def text(layout: Layout, task: str, outputs: PointOutputs, plan: Schedule) -> tu
             p.line(1, f"const V {_NAMES[array]}{k} = {argument}[{k}];")
     written = [n for _, n in outputs.targets()]
     p.read(plan, written, written)
-    _statements(p, outputs.targets(), [s for stage in plan.stages for s in stage.preamble])
+    _statements(p, outputs.targets(), [s for group in plan.stages for s in group.preamble])
     p.line(1, "return failed;")
     arguments = ", ".join(f"const V *restrict {a}" for a in ARRAYS.values())
     terms = "const softehl_terms *terms, " if layout.site.term_history else ""

@@ -14,7 +14,7 @@ from softehl.codegen.emit.c_printer import (
 from softehl.codegen.emit.points.c_lines import load
 from softehl.codegen.emit.points.loop_nest import Frame, components
 from softehl.codegen.emit.points.point_layout import orders
-from softehl.codegen.language.definition import Component, Quantity
+from softehl.codegen.language.definition import Component, PointQuantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class PointInputs:
         width = 1 + max([*self.f.needs["direction"], 0])
         self._array("t", width, moved)
 
-    def _fields(self, numbers: Iterable[int]) -> dict[int, Quantity]:
+    def _fields(self, numbers: Iterable[int]) -> dict[int, PointQuantity]:
         """Unknowns by number, those at the centroid left out."""
         form = self.f.layout.form
         return {k: form.all[k] for k in numbers if k not in form.centroid}
@@ -76,7 +76,7 @@ class PointInputs:
                         numbers.update(some if form.data[n].axis is not None else [n])
         return tuple(sorted(numbers))
 
-    def _with_gradient(self, quantities: Sequence[Quantity], k: int) -> list[int]:
+    def _with_gradient(self, quantities: Sequence[PointQuantity], k: int) -> list[int]:
         """A gradient entry with the others of its component, on which its variation depends."""
         q = quantities[k]
         if q.axis is None:
@@ -86,7 +86,7 @@ class PointInputs:
         ]
 
     def _interpolated(
-        self, source: str, quantities: dict[int, Quantity], array: str
+        self, source: str, quantities: dict[int, PointQuantity], array: str
     ) -> dict[str, str]:
         """Values and gradients of components at the point: entry of an array -> expression.
 
@@ -151,12 +151,12 @@ class PointInputs:
         width = f"({len(d.data)} + {point_expression(d)} * {f.layout.points})"
         first = count // 2 if d.point_rates else count
         f.out.add(f"const double *const at = a + {len(d.data)} + {point_expression(d)} * q;")
-        for start, amount, place in (
+        for start, amount, source in (
             (0, first, "at"),
             (first, count - first, f"at + {first} + {terms_expression(d)}"),
         ):
             if amount:
-                load(f.out, f"(b + {start})", place, amount, width)
+                load(f.out, f"(b + {start})", source, amount, width)
         write, step = "0", "0"
         if f.task in AT_POINTS:
             step = f"({fields_expression(d)} * {f.layout.points})"
@@ -198,7 +198,7 @@ class PointInputs:
                 moved[entry] = start + self._drag(quantities, k - first, "g")
         return moved
 
-    def _drag(self, quantities: Mapping[int, Quantity], k: int, array: str) -> str:
+    def _drag(self, quantities: Mapping[int, PointQuantity], k: int, array: str) -> str:
         """Change of a gradient by moving positions: - (gradient) L."""
         q = quantities[k]
         if q.axis is None:

@@ -35,10 +35,10 @@ from softehl.codegen.emit.points.c_lines import Lines, load, store
 from softehl.codegen.emit.points.loop_nest import Frame, components, products, to_nodes
 from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_inputs import PointInputs
-from softehl.codegen.emit.points.point_layout import Layout, orders
+from softehl.codegen.emit.points.point_layout import PointLayout, orders
 from softehl.codegen.graph.graph import Op
 from softehl.codegen.graph.traversal import reachable
-from softehl.codegen.language.definition import Quantity
+from softehl.codegen.language.definition import PointQuantity
 
 
 class Centroid(Frame):
@@ -67,7 +67,7 @@ class Centroid(Frame):
             out.add(f"for (int k = 0; k < {rates}; ++k) dc[k] = A[k];")
         for k in range(count if self.task == Task.TANGENT else 0):
             pairs = enumerate(outputs.moduli)
-            gradients: dict[Quantity, str] = {
+            gradients: dict[PointQuantity, str] = {
                 form.all[j]: f"A[{n}]" for n, (i, j) in pairs if i == k
             }
             out.open("")
@@ -90,7 +90,7 @@ class Group(Frame):
 
     def __init__(
         self,
-        layout: Layout,
+        layout: PointLayout,
         task: str,
         outputs: PointOutputs,
         pairs: str = "",
@@ -167,13 +167,13 @@ class Group(Frame):
                 to_nodes(self, fluxes, f"T[{k}]", "w * ")
                 out.close()
 
-    def _plain_fluxes(self) -> dict[Quantity, str]:
+    def _plain_fluxes(self) -> dict[PointQuantity, str]:
         return {q: f"P[{k}]" for k, q in self.layout.form.cell_quantities.items()}
 
-    def _moved_fluxes(self) -> dict[Quantity, str]:
+    def _moved_fluxes(self) -> dict[PointQuantity, str]:
         """Rates of fluxes with the contribution of moving positions."""
         numbers = {q: k for k, q in self.layout.form.cell_quantities.items()}
-        fluxes: dict[Quantity, str] = {}
+        fluxes: dict[PointQuantity, str] = {}
         for c in components(numbers):
             by_axis = {q.axis: k for q, k in numbers.items() if q.component == c}
             gradients = {axis: k for axis, k in by_axis.items() if axis is not None}
@@ -188,7 +188,7 @@ class Group(Frame):
                     terms += [f"(-P[{k}]) * L{axis}{m}" for m, k in gradients.items()]
                 name = f"moved{len(fluxes)}"
                 self.out.add(f"const V {name} = {' + '.join(terms)};")
-                fluxes[Quantity(c, axis)] = name
+                fluxes[PointQuantity(c, axis)] = name
         return fluxes
 
     def _finish(self) -> None:
@@ -209,7 +209,7 @@ _SHORT = 65536
 _NAME = f"{PREFIX}_{STEM}"
 
 
-def file(layout: Layout, outputs: PointOutputs) -> tuple[str, str]:
+def file(layout: PointLayout, outputs: PointOutputs) -> tuple[str, str]:
     """Name of the function and text of its file."""
     body = assembly(layout, outputs)
     tables = "\n".join(cell_constants.used(layout, body, STEM))
@@ -221,7 +221,7 @@ def file(layout: Layout, outputs: PointOutputs) -> tuple[str, str]:
     return name, text
 
 
-def declaration(name: str, layout: Layout, outputs: PointOutputs) -> str:
+def declaration(name: str, layout: PointLayout, outputs: PointOutputs) -> str:
     """Prototype: moduli of every point of a group of elements, tangents of these.
 
     With values at the centroid also, for each, derivatives of forces by it and its own by the
@@ -233,7 +233,7 @@ def declaration(name: str, layout: Layout, outputs: PointOutputs) -> str:
     return f"void {name}(V (*restrict S)[{parent.size}], {more}double *restrict K)"
 
 
-def assembly(layout: Layout, outputs: PointOutputs) -> str:
+def assembly(layout: PointLayout, outputs: PointOutputs) -> str:
     """Statements that assemble tangents K of a group of elements from their moduli S."""
     out, parent = Lines(), Parent(layout, outputs)
     count = len(layout.d.unknowns) ** 2
@@ -266,7 +266,7 @@ def assembly(layout: Layout, outputs: PointOutputs) -> str:
     return "\n".join(out.lines)
 
 
-def _store(out: Lines, layout: Layout, count: int, *, symmetric: bool) -> None:
+def _store(out: Lines, layout: PointLayout, count: int, *, symmetric: bool) -> None:
     in_groups, name = count - count % 4, f"{STEM}{layout.d.cell}_K"
     if count > _SHORT:
         _store_by_ranks(out, layout, symmetric=symmetric)
@@ -281,7 +281,7 @@ def _store(out: Lines, layout: Layout, count: int, *, symmetric: bool) -> None:
         out.add(f"softehl_store1(K + {k}, {count}, k_lanes[{name}[{k}]]);")
 
 
-def _entry_table(out: Lines, layout: Layout, name: str, *, symmetric: bool) -> None:
+def _entry_table(out: Lines, layout: PointLayout, name: str, *, symmetric: bool) -> None:
     """Table of the index in k_lanes of every entry, row by row.
 
     Of a symmetric tangent that of the two mirrored entries which is computed; the C compiler
@@ -303,7 +303,7 @@ def _entry_table(out: Lines, layout: Layout, name: str, *, symmetric: bool) -> N
     out.add(f"static const unsigned short {name}[{count}] = {{{rows}}};")
 
 
-def _store_by_ranks(out: Lines, layout: Layout, *, symmetric: bool) -> None:
+def _store_by_ranks(out: Lines, layout: PointLayout, *, symmetric: bool) -> None:
     """Stores of a large tangent: of two mirrored entries the one of lower rank is computed."""
     size = len(layout.d.unknowns)
     order = {rank: n for n, rank in enumerate(sorted(ranks(layout)))}
@@ -336,7 +336,7 @@ class At:
     plan: Schedule
 
 
-def kernel(layout: Layout, task: str, point: At, centroid: At | None) -> KernelText:
+def kernel(layout: PointLayout, task: str, point: At, centroid: At | None) -> KernelText:
     """The functions of the point and the centroid, the loops of the cell, and the batch."""
     text, temporaries = point_function.text(layout, task, point.outputs, point.plan)
     pieces, name, shared = [text], "", None
@@ -370,7 +370,7 @@ class Choice:
     why: str
 
 
-def choose(layout: Layout, tangent: PointOutputs, operations: int, short: int) -> Choice:
+def choose(layout: PointLayout, tangent: PointOutputs, operations: int, short: int) -> Choice:
     """The form of a model. operations: of the moduli at a point; short: up to which whole pays.
 
     tangent: moduli that are not zero.
@@ -390,7 +390,7 @@ def choose(layout: Layout, tangent: PointOutputs, operations: int, short: int) -
     return Choice(element_operations > limit, f"{estimate}, limit {limit}")
 
 
-def multiply_adds(layout: Layout, tangent: PointOutputs) -> int:
+def multiply_adds(layout: PointLayout, tangent: PointOutputs) -> int:
     """Multiply-adds of B^T S B at one point, pair by pair of nodes."""
     parent = Parent(layout, tangent)
     total, needed_orders = 0, orders(parent.quantities)

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from softehl.codegen.derive.output_entries import Entry
+from softehl.codegen.derive.output_entries import OutputEntry
 from softehl.codegen.elements.cells import ELEMENTS, linear
 from softehl.codegen.emit.points import basis_tables
-from softehl.codegen.emit.points.basis_tables import Shape
-from softehl.codegen.graph.graph import Input
+from softehl.codegen.emit.points.basis_tables import BasisTable
+from softehl.codegen.graph.graph import InputEntry
 from softehl.codegen.graph.traversal import reachable
-from softehl.codegen.language.definition import Component, Definition, PointForm, Quantity
+from softehl.codegen.language.definition import Component, Definition, PointForm, PointQuantity
 from softehl.codegen.language.fields import order_of
 from softehl.codegen.language.weak_form import rule_of
 
@@ -34,7 +34,7 @@ class StridedEntries:
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class PointLayout:
     """A family `d` with its form at a point. centroid: whether the only point is the centroid."""
 
     d: Definition
@@ -56,10 +56,10 @@ class Layout:
         """Beginning of the names of tables of constants."""
         return self.d.cell + ("_centroid" if self.centroid else "")
 
-    def at_centroid(self) -> Layout:
+    def at_centroid(self) -> PointLayout:
         """This family with the centroid as its only point."""
         rule = rule_of(ELEMENTS[self.d.cell], 1)
-        return Layout(replace(self.d, rule=rule), self.form, centroid=True)
+        return PointLayout(replace(self.d, rule=rule), self.form, centroid=True)
 
     @property
     def points(self) -> int:
@@ -98,7 +98,7 @@ class Layout:
         ]
         return min(s for s in inside if entries.start - s in range(entries.stride))
 
-    def shape(self, order: int) -> Shape:
+    def shape(self, order: int) -> BasisTable:
         """Shape functions of an order."""
         if order == 0:
             return basis_tables.constant(self.points, self.dimension)
@@ -116,11 +116,11 @@ class Layout:
         return sorted(order for order in used_orders if self.shape(order).long)
 
     @cached_property
-    def _shapes(self) -> dict[int, Shape]:
+    def _shapes(self) -> dict[int, BasisTable]:
         return {}
 
     @cached_property
-    def geometry(self) -> Shape:
+    def geometry(self) -> BasisTable:
         """Shape functions of the map from the parent cell."""
         return self.shape(order_of(ELEMENTS[self.d.cell]))
 
@@ -132,11 +132,11 @@ class Needs:
     arrays: dict[str, tuple[int, ...]]
 
     @staticmethod
-    def of(entries: Iterable[Entry]) -> Needs:
+    def of(entries: Iterable[OutputEntry]) -> Needs:
         """Inputs of some outputs."""
         numbers: dict[str, set[int]] = {}
         for n in reachable([x.node for x in entries]):
-            if isinstance(n.payload, Input):
+            if isinstance(n.payload, InputEntry):
                 numbers.setdefault(n.payload.array, set()).add(n.payload.index)
         return Needs({array: tuple(sorted(some)) for array, some in numbers.items()})
 
@@ -144,6 +144,6 @@ class Needs:
         return self.arrays.get(array, ())
 
 
-def orders(quantities: Sequence[Quantity]) -> list[int]:
+def orders(quantities: Sequence[PointQuantity]) -> list[int]:
     """Orders of shape functions that occur, the highest first."""
     return sorted({q.component.order for q in quantities}, reverse=True)

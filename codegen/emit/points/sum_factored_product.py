@@ -36,15 +36,15 @@ from softehl.codegen.emit.points.c_lines import Lines, load
 from softehl.codegen.emit.points.loop_nest import Frame, components, products
 from softehl.codegen.emit.points.point_function import PointOutputs
 from softehl.codegen.emit.points.point_inputs import PointInputs
-from softehl.codegen.emit.points.point_layout import Layout
-from softehl.codegen.language.definition import Component, Quantity
+from softehl.codegen.emit.points.point_layout import PointLayout
+from softehl.codegen.language.definition import Component, PointQuantity
 
 
 @dataclass(frozen=True, eq=False)
 class PointCache:
     """The inverse Jacobian, the volume, and the inputs of the function of the point."""
 
-    layout: Layout
+    layout: PointLayout
     outputs: PointOutputs
 
     @cached_property
@@ -201,12 +201,12 @@ def scatter(components: int, nodes: int) -> list[str]:
     return [*lines, "}"]
 
 
-def fits(layout: Layout) -> bool:
+def fits(layout: PointLayout) -> bool:
     """True if a model has a product by sum factorisation on its cell."""
     return has_lines(layout) and {c.order for c in layout.components} == {layout.geometry.order}
 
 
-def has_lines(layout: Layout) -> bool:
+def has_lines(layout: PointLayout) -> bool:
     """True if sums over the points of the cell go along lines, and no value is at the centroid."""
     shape, cell = layout.geometry, layout.d.cell
     if layout.form.centroid or layout.d.term_history:
@@ -220,7 +220,7 @@ def has_lines(layout: Layout) -> bool:
 class Factored:
     """The functions of a model whose product at a point has these outputs."""
 
-    layout: Layout
+    layout: PointLayout
     outputs: PointOutputs
     plan: Schedule
 
@@ -249,7 +249,7 @@ class Factored:
         return len(line.values[0]), len(line.values)
 
     @cached_property
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, SymmetricTable]:
         """to: from nodes to points. slope: derivatives at points from values there."""
         rule, D = self.layout.d.rule, self.layout.dimension
         n, count = self._sizes
@@ -258,7 +258,7 @@ class Factored:
         assert len(cell) == n
         assert len(rule.points) == count**D
         to, slope = lagrange(cell, at)[0], lagrange(at, at)[1]
-        return {"to": Table(to, 1), "slope": Table(slope, -1)}
+        return {"to": SymmetricTable(to, 1), "slope": SymmetricTable(slope, -1)}
 
     def _tables_of_lines(self) -> str:
         return "\n".join(
@@ -399,7 +399,7 @@ class Factored:
         entries = {quantity: f"P[{k}]" for k, quantity in enumerate(self.layout.form.unknowns)}
         met = components(entries)
         for c, k in number.items():
-            value = entries.get(Quantity(c, None))
+            value = entries.get(PointQuantity(c, None))
             if self._of_values:
                 out.add(f"u[{k}][p] = {f'w * {value}' if value else 'softehl_splat(0.0)'};")
             gradients = {q.axis: v for q, v in entries.items() if q.component == c}
@@ -411,7 +411,7 @@ class Factored:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class SymmetricTable:
     """A matrix (rows, columns) that is the same, or its negative, when both are reversed.
 
     sign: 1 or -1.
@@ -427,7 +427,7 @@ class Table:
             raise ValueError("the matrix along a line is not symmetric to its middle")
 
 
-def sweep(name: str, table: Table, kind: str) -> str:
+def sweep(name: str, table: SymmetricTable, kind: str) -> str:
     """A function of C that multiplies values along a line by the matrix.
 
     kind: "forth", or "back" by the transpose; back along slopes adds to what is there. Sums and

@@ -23,16 +23,16 @@ def at1(m: Fields) -> None:
         length="length of the smeared crack [mm]",
     )
     m.require(E > 0, nu > -1, nu < sp.Rational(1, 2), Gc > 0, length > 0)
-    (before,) = m.point_data(largest="largest energy that drives the crack so far [MPa]")
+    (previous,) = m.point_data(largest="largest energy that drives the crack so far [MPa]")
     lame, G = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 + 2 * nu)
     gradient = sp.zeros(3)
     gradient[: len(u), : len(u)] = m.grad(u)[: len(u), : len(u)]
     strain = m.define("strain", (gradient + gradient.T) / 2)
     psi = lame / 2 * strain.trace() ** 2 + G * (strain * strain).trace()
     tension = lame * strain.trace() * sp.eye(3) + 2 * G * strain
-    largest = m.define("now", sp.Max(psi, before))
-    whole = (1 - d) ** 2 + sp.Rational("1e-9")
-    stress = m.define("stress", whole * tension)
+    largest = m.define("now", sp.Max(psi, previous))
+    degradation = (1 - d) ** 2 + sp.Rational("1e-9")
+    stress = m.define("stress", degradation * tension)
     m.weak(stress[: len(u), : len(u)], m.grad(u)[: len(u), : len(u)])
     # d >= 0 by the smallest energy that drives a crack
     driving = sp.Max(largest, 3 * Gc / (16 * length))

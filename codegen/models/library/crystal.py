@@ -68,13 +68,15 @@ def crystal(m: Material) -> None:
         a = e - flow(t)[0]
         normal = [(C11 - C12) * a[k, k] + C12 * a.trace() for k in range(3)]
         shear = [2 * C44 * a[i, j] for i, j in IJ[3:]]
-        rest = [b - s / g for b, s in zip(t, (*normal, *shear), strict=True)]
-        return [r + sum(rest) for r in rest]  # a stress that vanishes is one up to rounding of all
+        residual = [b - s / g for b, s in zip(t, (*normal, *shear), strict=True)]
+        return [
+            r + sum(residual) for r in residual
+        ]  # a stress that vanishes is one up to rounding of all
 
     t = m.implicit("t", balance, start=[a / g for a in t_old], size=1, iterations=100)
     strain, total = flow(t)
     m.stress(g * R.T * tensor(t) * R)
     m.fields(slip=slip_old + total)
-    kept = {f"p_{a}": (p + strain)[i, j] for a, (i, j) in zip(NAMES, IJ, strict=True)}
+    strains = {f"p_{a}": (p + strain)[i, j] for a, (i, j) in zip(NAMES, IJ, strict=True)}
     new = {f"t_{a}": g * s for a, s in zip(NAMES, t, strict=True)}
-    m.history(**kept, **new, slip=slip_old + total)
+    m.history(**strains, **new, slip=slip_old + total)

@@ -26,7 +26,7 @@ def gradient_damage(m: Fields) -> None:
         ratio="strength in compression by that in tension",
     )
     m.require(E > 0, nu > -1, nu < sp.Rational(1, 2), length > 0, k_0 > 0, a <= 1, b > 0, ratio > 0)
-    (before,) = m.point_data(largest="largest smoothed strain so far")
+    (previous,) = m.point_data(largest="largest smoothed strain so far")
     lame, G = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 + 2 * nu)
     gradient = sp.zeros(3)
     gradient[: len(u), : len(u)] = m.grad(u)[: len(u), : len(u)]
@@ -35,7 +35,7 @@ def gradient_damage(m: Fields) -> None:
     shape = (strain - volume / 3 * sp.eye(3)) * sp.sqrt(6 * ratio) / (1 + nu)
     part = (ratio - 1) / (1 - 2 * nu) * volume
     equivalent = m.define("equivalent", (part + m.norm([part, *shape])) / (2 * ratio))
-    largest = m.define("now", sp.Max(e, before))
+    largest = m.define("now", sp.Max(e, previous))
     left = k_0 / largest * (1 - a + a * sp.exp(-b * (largest - k_0)))
     D = m.define("D", sp.Piecewise((1 - left, largest > k_0), (0, True)))
     stress = m.define("stress", (1 - D) * (lame * volume * sp.eye(3) + 2 * G * strain))

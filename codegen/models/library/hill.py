@@ -62,8 +62,10 @@ def hill(m: Material) -> None:
         back = elastic([d / limit * x for x in flow(t)])
         stress = [(a - b + c) / sy for a, b, c in zip(t, trial, back, strict=True)]
         rows = [*stress, square(t) / limit**2 - 1]
-        off = [*((a - b) / sy for a, b in zip(t, trial, strict=True)), d]
-        return [sp.Piecewise((a, yields), (b, True)) for a, b in zip(rows, off, strict=True)]
+        below_yield = [*((a - b) / sy for a, b in zip(t, trial, strict=True)), d]
+        return [
+            sp.Piecewise((a, yields), (b, True)) for a, b in zip(rows, below_yield, strict=True)
+        ]
 
     *t, d = m.implicit("s", balance, start=[*trial, sp.Integer(0)])
     m.stress(sp.Matrix([[t[0], t[3], t[5]], [t[3], t[1], t[4]], [t[5], t[4], t[2]]]))

@@ -35,4 +35,4 @@ def pian_tong(m: Fields) -> None:
     complementary -= nu / (2 * E) * stress.trace() ** 2
     m.minimise((stress * strain).trace() - complementary)
     parts = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
-    m.fields(**{f"sigma_{name}": stress[place] for name, place in parts.items()})
+    m.fields(**{f"sigma_{name}": stress[position] for name, position in parts.items()})

@@ -20,7 +20,7 @@ def prony(m: Material) -> None:
     m.require(mu > 0, kappa > 0)
     beta = m.array("beta", "moduli of the branches by mu")
     tau = m.array("tau", "their times of relaxation [s]")
-    before = list(m.point_data(**{f"S_{n}": "second stress of the shape, old" for n in NAMES}))
+    previous = list(m.point_data(**{f"S_{n}": "second stress of the shape, old" for n in NAMES}))
     Q = [m.point_array(f"Q_{n}", beta, "overstress") for n in NAMES]
     J = m.define("J", m.F.det())
     C = m.define("C", m.F.T * m.F)
@@ -31,11 +31,13 @@ def prony(m: Material) -> None:
     def renewed(beta: sp.Expr, tau: sp.Expr, *Q: sp.Expr) -> list[sp.Expr]:
         """Overstress after the step: the stress of the shape changes at its middle."""
         half = sp.exp(-dt / (2 * tau))
-        return [half * (half * q + beta * (s - b)) for q, s, b in zip(Q, now, before, strict=True)]
+        return [
+            half * (half * q + beta * (s - b)) for q, s, b in zip(Q, now, previous, strict=True)
+        ]
 
     new = m.each(beta, tau, *Q, renewed)
     xx, yy, zz, xy, yz, xz = m.sum(beta, tau, *Q, renewed)
     over = sp.Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     m.second_stress(kappa / 2 * (J**2 - 1) * inverse + S + over)
-    kept = {f"Q_{n}": q for n, q in zip(NAMES, new, strict=True)}
-    m.history(**kept, **{f"S_{n}": s for n, s in zip(NAMES, now, strict=True)})
+    branches = {f"Q_{n}": q for n, q in zip(NAMES, new, strict=True)}
+    m.history(**branches, **{f"S_{n}": s for n, s in zip(NAMES, now, strict=True)})

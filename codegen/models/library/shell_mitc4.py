@@ -40,10 +40,10 @@ def shell_mitc4() -> Definition:
         return sum((w * v for w, v in zip(weights, values, strict=True)), sp.zeros(3, 1))
 
     D = shapes.quad4_gradient(xi, eta)
-    slopes = [[g[i] for g in D] for i in (0, 1)]
-    G = [m.define(f"G_{i}", mean(slopes[i], start)) for i in (0, 1)]
-    g = [m.define(f"g_{i}", mean(slopes[i], now)) for i in (0, 1)]
-    N_, d_ = ([mean(slopes[i], v) for i in (0, 1)] for v in (normal, director))
+    gradients = [[g[i] for g in D] for i in (0, 1)]
+    G = [m.define(f"G_{i}", mean(gradients[i], start)) for i in (0, 1)]
+    g = [m.define(f"g_{i}", mean(gradients[i], now)) for i in (0, 1)]
+    N_, d_ = ([mean(gradients[i], v) for i in (0, 1)] for v in (normal, director))
     # local axes: L is the Jacobian of the surface
     l1 = m.define("l1", m.norm(G[0]))
     e1 = m.define("e1", G[0] / l1)

@@ -28,11 +28,11 @@ def solid_shell() -> Definition:
     moved = sp.Matrix(3, 8, lambda i, k: u[i][k])
     xi, eta, zeta = m.point()
 
-    def bases(name: str, *place: sp.Expr) -> tuple[sp.Matrix, sp.Matrix]:
+    def bases(name: str, *point: sp.Expr) -> tuple[sp.Matrix, sp.Matrix]:
         """Undeformed and deformed base vectors at a place of the parent cell."""
-        slopes = sp.Matrix(shapes.hex8_gradient(*place))
-        return m.define(f"G_{name}", start * slopes), m.define(
-            f"g_{name}", (start + moved) * slopes
+        gradients = sp.Matrix(shapes.hex8_gradient(*point))
+        return m.define(f"G_{name}", start * gradients), m.define(
+            f"g_{name}", (start + moved) * gradients
         )
 
     def strain(G: sp.Matrix, g: sp.Matrix, i: int, k: int) -> sp.Expr:
@@ -44,8 +44,8 @@ def solid_shell() -> Definition:
     for axis, other in ((0, eta), (1, xi)):
         sides = []
         for s in (-1, 1):
-            place = (zero, s, zero) if axis == 0 else (s, zero, zero)
-            value = strain(*bases(f"{axis}{s + 1}", *place), axis, 2)
+            point = (zero, s, zero) if axis == 0 else (s, zero, zero)
+            value = strain(*bases(f"{axis}{s + 1}", *point), axis, 2)
             sides.append((1 + s * other) / 2 * m.define(f"shear_{axis}{s + 1}", value))
         e[axis, 2] = sum(sides)
     across = []
@@ -72,7 +72,7 @@ def solid_shell() -> Definition:
     green = m.define("green", green)
     lame, mu = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 + 2 * nu)
     W = lame / 2 * green.trace() ** 2 + mu * (green * green).trace()
-    place = moved * sp.Matrix(shapes.hex8(xi, eta, zeta))
-    W -= sum(force * v for force, v in zip(q, place, strict=True))
+    displacement = moved * sp.Matrix(shapes.hex8(xi, eta, zeta))
+    W -= sum(force * v for force, v in zip(q, displacement, strict=True))
     m.potential(m.integral("Pi", W * detJ))
     return m.finish()

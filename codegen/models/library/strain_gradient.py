@@ -33,8 +33,8 @@ def strain_gradient(m: Fields) -> None:
 
     H = m.grad(u)
     strain = [H[0, 0], H[1, 1], (H[0, 1] + H[1, 0]) / 2]
-    slopes = [m.grad(v) for v in e]
-    W = energy(*strain) + length**2 * sum(energy(*(s[k] for s in slopes)) for k in (0, 1))
+    gradients = [m.grad(v) for v in e]
+    W = energy(*strain) + length**2 * sum(energy(*(s[k] for s in gradients)) for k in (0, 1))
     weights = (1, 1, 2)
     m.minimise(W + sum(
         w * p * (a - b) for w, p, a, b in zip(weights, multipliers, strain, e, strict=True)

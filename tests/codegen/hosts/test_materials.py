@@ -16,8 +16,14 @@ from hypothesis import given
 import softehl
 from softehl.codegen.abi import TargetError
 from softehl.codegen.elements import quadrature
-from softehl.codegen.graph.evaluation import State, Walk
-from softehl.codegen.hosts.material_response import VOIGT, Measure, Response, response, solid
+from softehl.codegen.graph.evaluation import EvaluationState, Walk
+from softehl.codegen.hosts.material_response import (
+    VOIGT,
+    MaterialResponse,
+    Measure,
+    response,
+    solid,
+)
 from softehl.codegen.language.errors import ModelError
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.language.model import Model
@@ -34,10 +40,10 @@ F = np.array([[1.1, 0.2, -0.1], [0.05, 0.9, 0.15], [-0.2, 0.1, 1.3]])
 needs_fortran = pytest.mark.skipif(shutil.which("gfortran") is None, reason="no gfortran")
 
 
-def values(r: Response, parameters: list[float]) -> tuple[float, Array, Array]:
+def values(r: MaterialResponse, parameters: list[float]) -> tuple[float, Array, Array]:
     """Energy, stress and modulus at F."""
     with mpmath.workdps(30):
-        walk = Walk(State((), F.ravel().tolist(), (), parameters), {})
+        walk = Walk(EvaluationState((), F.ravel().tolist(), (), parameters), {})
         found = [float(walk.value(n)) for _, n in r.definition.fields]
     moduli = [[found[r.modulus(i, j)] for j in range(6)] for i in range(6)]
     return found[0], np.array(found[1:7]), np.array(moduli)
