@@ -92,7 +92,7 @@ class TieForces:
             x[self.forces] = self.normal.solve(self.equations @ left)
 
 
-class Product(Protocol):
+class TangentProduct(Protocol):
     """The tangent of a block: y += K x for vectors as `ElementNumbering.vector` makes them."""
 
     def __call__(self, x: Array, y: Array) -> None:
@@ -132,7 +132,7 @@ class Backend(Protocol):
 
     def product(
         self, block: ElementBlock, x: Array, parameters: Array, levels: MultigridLevels
-    ) -> Product:
+    ) -> TangentProduct:
         """The tangent of a block at x, (n,)."""
         ...
 
@@ -152,12 +152,12 @@ class Backend(Protocol):
         ...
 
 
-class Host:
+class Processor:
     """The processor of this process."""
 
     def product(
         self, block: ElementBlock, x: Array, parameters: Array, levels: MultigridLevels
-    ) -> Product:
+    ) -> TangentProduct:
         """See `Backend`."""
         return ElementProduct.of(block, x, parameters, levels.numberings[block.name])
 
@@ -216,7 +216,7 @@ class MatrixFreeOperator:
     problem: Problem
     levels: MultigridLevels
     iteration: KrylovSettings
-    products: tuple[Product, ...]
+    products: tuple[TangentProduct, ...]
     loads_matrix: csr_array
     diagonals: Array
     ties: TieForces
@@ -236,7 +236,7 @@ class MatrixFreeOperator:
         backend: Backend | None = None,
     ) -> MatrixFreeOperator:
         """At x, (n,); on the host if no backend is given."""
-        backend = backend or Host()
+        backend = backend or Processor()
         products, diagonal, loads_matrix = [], np.zeros(len(x)), csr_array((len(x), len(x)))
         count = levels.steps[0].shape[1]
         lower = csr_array((count, count))

@@ -17,7 +17,7 @@ from softehl.runtime.fit.objective import StudyEvaluations
 from softehl.runtime.fit.trust_region import minimise
 from softehl.runtime.kernels.kernel_call import ArgumentError
 from softehl.runtime.results.result import Result
-from softehl.runtime.sensitivity.hessian import Term, hessian_products
+from softehl.runtime.sensitivity.hessian import HessianTerm, hessian_products
 from softehl.runtime.sensitivity.input_parsing import By
 from softehl.runtime.sensitivity.inputs import (
     Input,
@@ -313,7 +313,7 @@ class LeastSquares:
         """Sum of residuals times their second derivatives by the inputs, (k, k)."""
         weights = residuals / self._scales()
         entries = zip(self._entries(values), weights.tolist(), strict=True)
-        terms = [Term(tape, q, weight) for (tape, q), weight in entries]
+        terms = [HessianTerm(tape, q, weight) for (tape, q), weight in entries]
         return hessian_products(terms, self.trials.inputs, np.eye(len(values)))
 
     def residuals(self, values: Array) -> Array:

@@ -17,7 +17,7 @@ from softehl.runtime.definition.problem_definition import ProblemDefinition, Stu
 from softehl.runtime.equations.stability import UnstableState
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity import input_parsing
-from softehl.runtime.sensitivity.hessian import Term, hessian_products
+from softehl.runtime.sensitivity.hessian import HessianTerm, hessian_products
 from softehl.runtime.sensitivity.input_parsing import By
 from softehl.runtime.sensitivity.inputs import Input, Key, varied_definition_of
 from softehl.runtime.sensitivity.jacobian import jacobian
@@ -176,7 +176,7 @@ class Objective:
     def _products(self, values: Array, directions: Array) -> Array:
         tape = self.trials.solved(np.asarray(values, dtype=np.float64))[-1].trail
         assert tape is not None
-        return hessian_products([Term(tape, self.quantity)], self.trials.inputs, directions)
+        return hessian_products([HessianTerm(tape, self.quantity)], self.trials.inputs, directions)
 
 
 def objective(

@@ -19,9 +19,9 @@ from softehl.runtime.discretisation.communicator import Communicator
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.matrix_free_operator import (
     Backend,
-    Host,
     KrylovSettings,
     MatrixFreeOperator,
+    Processor,
     TieForces,
 )
 from softehl.runtime.discretisation.matrix_free_products import (
@@ -94,7 +94,7 @@ class MatrixFree:
         pages, order = require_products(system)
         levels = levels_of(system, pages, order, self.threads or threads())
         iteration = KrylovSettings(self.tolerance, self.most, self.iterations)
-        backend = Host() if self.device is None else self._on_device(system)
+        backend = Processor() if self.device is None else self._on_device(system)
         return replace(system, comm=_MatrixFreeCommunicator(levels, iteration, backend))
 
     def _on_device(self, system: System) -> Backend:

@@ -37,7 +37,7 @@ from softehl.runtime.results.integrals import integral
 from softehl.runtime.results.output import VtuFields, piece_names
 from softehl.runtime.results.plotting import picture_of
 from softehl.runtime.results.recovery import nodal_operator, recover_block
-from softehl.runtime.sensitivity.hessian import Term, hessian_by_key, hessian_products
+from softehl.runtime.sensitivity.hessian import HessianTerm, hessian_by_key, hessian_products
 from softehl.runtime.sensitivity.input_parsing import By, components, inputs
 from softehl.runtime.sensitivity.inputs import Input, Key
 from softehl.runtime.sensitivity.jacobian import by_key, derivative, sensitivity
@@ -698,7 +698,7 @@ class Result:
         """
         tape, selected = self._differentiated(by)
         count = sum(len(item.value) for item in selected)
-        terms = [Term(tape, quantity(what, at, reaction))]
+        terms = [HessianTerm(tape, quantity(what, at, reaction))]
         return hessian_by_key(hessian_products(terms, selected, np.eye(count)), selected)
 
     def hessian_product(
@@ -744,7 +744,7 @@ class Result:
         """
         tape, selected = self._differentiated(by)
         along = components(selected, direction)
-        terms = [Term(tape, quantity(what, at, reaction))]
+        terms = [HessianTerm(tape, quantity(what, at, reaction))]
         return by_key(hessian_products(terms, selected, along[:, None])[:, 0], selected)
 
     def derivative(self, *, by: By) -> Array:

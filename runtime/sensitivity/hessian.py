@@ -30,7 +30,7 @@ from softehl.runtime.sensitivity.tape import Tape, blocks_with_history, time_cou
 
 
 @dataclass(frozen=True, eq=False)
-class Term:
+class HessianTerm:
     """A term of a sum whose second derivatives are computed: weight times quantity of a step."""
 
     tape: Tape
@@ -38,7 +38,9 @@ class Term:
     weight: float = 1.0
 
 
-def hessian_products(terms: Sequence[Term], inputs: Sequence[Input], directions: Array) -> Array:
+def hessian_products(
+    terms: Sequence[HessianTerm], inputs: Sequence[Input], directions: Array
+) -> Array:
     """Hessian of a sum of quantities times directions (k, m), all components of the inputs.
 
     Raises StudyError where second derivatives do not exist.
@@ -68,7 +70,7 @@ def hessian_by_key(matrix: Array, inputs: Sequence[Input]) -> dict[tuple[Key, Ke
 
 
 @dataclass(eq=False)
-class _AdjointState:
+class _CurvatureState:
     """Derivatives of the sum by the state after a step, or their rates along a direction.
 
     states: by the unknowns after it, and after the step before it, (n,) each. histories: by the
@@ -92,7 +94,7 @@ class _Path:
     """The steps of a path, first to last, and the terms of the sum at them."""
 
     chain: Sequence[Tape]
-    terms: Sequence[Term]
+    terms: Sequence[HessianTerm]
     inputs: Sequence[Input]
 
     def __post_init__(self) -> None:
@@ -106,7 +108,7 @@ class _Path:
         """The Hessian of the sum times directions (k, m)."""
         products = np.zeros(np.shape(directions))
         records, n = self._forward(directions), len(self.chain[-1].x)
-        adjoint = _AdjointState([np.zeros(n), np.zeros(n)])
+        adjoint = _CurvatureState([np.zeros(n), np.zeros(n)])
         rates = [replace(adjoint) for _ in directions.T]
         for tape, row in zip(reversed(self.chain), reversed(records), strict=True):
             back = _Back(self, LinearisedStep(tape))
@@ -178,7 +180,7 @@ class _Back:
             for name, elements in step.blocks.items()
         }
 
-    def solve(self, state: _AdjointState) -> None:
+    def solve(self, state: _CurvatureState) -> None:
         """Compute the adjoints of this step, and the derivatives by all arguments of elements."""
         step, n = self.step, len(self.step.tape.x)
         slope, weights = state.states[0].copy(), np.zeros(n)
@@ -200,8 +202,8 @@ class _Back:
         }
 
     def rate(
-        self, state: _AdjointState, record: _Record, direction: Array, product: Array
-    ) -> _AdjointState:
+        self, state: _CurvatureState, record: _Record, direction: Array, product: Array
+    ) -> _CurvatureState:
         """Add the part of this step to the product (k,); return the rates before the step."""
         step, dx, none = self.step, record.unknowns, np.zeros(len(record.unknowns))
         rows = argument_rates(step, self._moves, direction, record.previous)
@@ -226,7 +228,9 @@ class _Back:
         self.path.bends(step.tape, direction).pull_prescribed(product, self._at_supports)
         return self.previous(state, rates)
 
-    def previous(self, state: _AdjointState, gradients: Mapping[str, Variation]) -> _AdjointState:
+    def previous(
+        self, state: _CurvatureState, gradients: Mapping[str, Variation]
+    ) -> _CurvatureState:
         """Derivatives by the state after the previous step, or their rates."""
         tape = self.step.tape
         earlier = [state.states[1].copy(), np.zeros(len(tape.x))]
@@ -242,10 +246,10 @@ class _Back:
                 if datum not in kernel.history and after is not None:
                     by_history[:, :, column] += after[:, :, column]
             histories[name] = by_history
-        return _AdjointState(earlier, histories)
+        return _CurvatureState(earlier, histories)
 
     def _rates(
-        self, along: Mapping[str, Variation], adjoint_rate: Array, state: _AdjointState
+        self, along: Mapping[str, Variation], adjoint_rate: Array, state: _CurvatureState
     ) -> dict[str, Variation]:
         """Rates of the derivatives by all arguments of elements. adjoint_rate: (n,)."""
         return {
@@ -255,7 +259,7 @@ class _Back:
             for name, curvatures in self._curvatures.items()
         }
 
-    def _adjoints(self, values: Array, name: str, state: _AdjointState) -> Adjoints:
+    def _adjoints(self, values: Array, name: str, state: _CurvatureState) -> Adjoints:
         """Of a block, of values (n,) at all unknowns."""
         return Adjoints(values[self.step.blocks[name].block.dofs], state.histories.get(name))
 

@@ -100,7 +100,7 @@ class _Set:
 
 
 @dataclass
-class _Surface:
+class _SurfaceCards:
     """Lines of a surface: name or number of elements or nodes, and a label of faces."""
 
     name: str
@@ -122,7 +122,7 @@ class _Scope:
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     elements: dict[int, tuple[str, str, tuple[int, ...]]] = field(default_factory=dict)
     sets: dict[tuple[str, str], _Set] = field(default_factory=dict)
-    surfaces: dict[str, _Surface] = field(default_factory=dict)
+    surfaces: dict[str, _SurfaceCards] = field(default_factory=dict)
 
     def set(self, kind: str, name: str, location: str) -> _Set:
         """The set of a name, which is made where it is new."""
@@ -226,7 +226,7 @@ def _integer(text: str, location: str) -> int:
 
 
 @dataclass
-class _Model:
+class _AbaqusModel:
     """State of reading: parts by names in capitals, instances, and what the model itself has.
 
     rings: a type of axisymmetric elements, if there are some.
@@ -347,7 +347,8 @@ class _Model:
             )
             return
         target = self.current.surfaces.setdefault(
-            name.upper(), _Surface(name, keyword.location, kind, [], "INTERNAL" in keyword.options)
+            name.upper(),
+            _SurfaceCards(name, keyword.location, kind, [], "INTERNAL" in keyword.options),
         )
         for line in data:
             fields = _fields(line.text)
@@ -374,7 +375,7 @@ class _Model:
             k: _Set(s.name, s.location, list(s.members), s.internal) for k, s in source.sets.items()
         }
         surfaces = {
-            k: _Surface(s.name, s.location, s.kind, list(s.lines), s.internal)
+            k: _SurfaceCards(s.name, s.location, s.kind, list(s.lines), s.internal)
             for k, s in source.surfaces.items()
         }
         self.current = _Scope(name, moved, dict(source.elements), sets, surfaces)
@@ -386,15 +387,15 @@ class _Model:
 
 
 _READERS = {
-    "NODE": _Model.nodes,
-    "ELEMENT": _Model.elements,
-    "NSET": _Model.sets,
-    "ELSET": _Model.sets,
-    "SURFACE": _Model.surface,
-    "PART": _Model.part,
-    "INSTANCE": _Model.instance,
-    "ENDPART": _Model.end,
-    "ENDINSTANCE": _Model.end,
+    "NODE": _AbaqusModel.nodes,
+    "ELEMENT": _AbaqusModel.elements,
+    "NSET": _AbaqusModel.sets,
+    "ELSET": _AbaqusModel.sets,
+    "SURFACE": _AbaqusModel.surface,
+    "PART": _AbaqusModel.part,
+    "INSTANCE": _AbaqusModel.instance,
+    "ENDPART": _AbaqusModel.end,
+    "ENDINSTANCE": _AbaqusModel.end,
 }
 
 
@@ -520,7 +521,7 @@ class _Mesh:
             return self.one(kind, instance.upper(), int(label) if label.isdigit() else label)
         return self.members(kind, key, member, seen)
 
-    def side(self, key: str, surface: _Surface) -> Side:
+    def side(self, key: str, surface: _SurfaceCards) -> Side:
         """Faces of a surface; its nodes, where it is of nodes."""
         entities: Side = {}
         if surface.kind == "UNION":
@@ -543,7 +544,7 @@ class _Mesh:
         return entities
 
     def faces(
-        self, element: int, label: str, surface: _Surface
+        self, element: int, label: str, surface: _SurfaceCards
     ) -> Iterable[tuple[str, tuple[int, ...]]]:
         """Faces of an element that a label means; without one those on the outside."""
         kind, row, family = self.cells[element]
@@ -597,7 +598,7 @@ def _face_number(family: str, label: str) -> int | None:
 
 def read(path: Path) -> Content:
     """Content of a file.  Raises AbaqusError, OSError."""
-    model = _Model()
+    model = _AbaqusModel()
     for keyword, data in _blocks(_lines(path, path.parent)):
         model.read(keyword, data)
     if model.rings:
