@@ -341,10 +341,10 @@ def keys(case: str) -> int:
     help="""Find the values of keys that bring a result of CASE to TARGET.
 
     Example: `softehl design oring "friction -10%" --by rod_diameter`. Other targets: "friction
-    below 5 N", "h_star above 0.5 um", "leakage below 1 mm3 a cycle". Exact sensitivities give the
-    value, and a nonlinear solve checks it. The state is that of the first speed, at outstroke
-    unless stroke = in; a cycle has both. Exit code: 0 done, 2 bad input, or a target that cannot be
-    met.
+    below 5 N", "h_star above 0.5 um", "leakage below 1 mm3 a cycle"; several bounds are joined by
+    "and". Exact sensitivities give the value, and a nonlinear solve checks it. The state is that of
+    the first speed, at outstroke unless stroke = in; a cycle has both, and a bound on friction,
+    film or pressure holds in both. Exit code: 0 done, 2 bad input, or a target that cannot be met.
     """,
     context_settings={"ignore_unknown_options": True},  # a target that begins with a minus sign
 )

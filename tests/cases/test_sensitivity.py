@@ -29,6 +29,7 @@ from softehl.cases.seal.sensitivity.design import (
     Lever,
     NoDesignError,
     Target,
+    bounded,
     designed,
     joint_lever,
     settled,
@@ -429,6 +430,12 @@ def steps(target: Target, solve: Callable[[Seal], FilmState | None]) -> list[Des
         state = solve(p)
         return DesignFilm.of(state, target.quantity, held(p)) if state else None
 
+    def all_of(p: Seal) -> list[DesignFilm] | None:
+        film = with_mesh(p)
+        return [film] if film else None
+
+    if target.side:
+        return bounded(P, [target], 0, BY, all_of)
     return designed(P, target, BY, with_mesh)
 
 
@@ -508,6 +515,38 @@ def test_a_bound_is_passed_and_not_met_twice() -> None:
     assert len(found) == 2
     assert found[-1].quantity == pytest.approx(0.995 * 4.8)
     assert steps(Target.of("friction = 4.8 N"), power_law)[-1].quantity == pytest.approx(4.8)
+
+
+def test_several_bounds_are_met_by_the_least_change_or_contradict() -> None:
+    """Friction 5 (d/50)^-3 N and h* 2 (d/50)^2 um."""
+
+    def films(p: Seal) -> list[DesignFilm]:
+        ratio, state = p.rod_diameter / 50.0, power_law(p)
+        values = ((5.0 * ratio**POWER, POWER), (2.0 * ratio**2, 2.0))
+        return [DesignFilm(state, value, {"rod_diameter": s}) for value, s in values]
+
+    friction = Target.of("friction below 4.8 N")
+    found = bounded(P, [friction, Target.of("h_star below 2.2 um")], 0, BY, films)
+    assert len(found) == 2
+    assert found[-1].values[0] == pytest.approx(0.995 * 4.8)
+    assert found[-1].values[1] < 2.2
+    found = bounded(P, [friction, Target.of("h_star above 2.1 um")], 1, BY, films)
+    assert found[-1].quantity == pytest.approx(1.005 * 2.1)
+    with pytest.raises(
+        NoDesignError, match=r"no rod_diameter holds all bounds: .* above 50\.7"
+    ) as no:
+        bounded(P, [friction, Target.of("h_star below 2.04 um")], 0, BY, films)
+    assert "h_star below 2.04 um needs it below 50.5 mm" in str(no.value)
+
+
+def test_several_targets_are_bounds_of_both_strokes() -> None:
+    text = "friction below 5 N and h* above 0.5 um, leakage < 1 mm3/cycle"
+    found = [(t.quantity, t.stroke) for t in Target.several(text, both=True)]
+    strokes = [(name, stroke) for name in ("friction", "h_star") for stroke in ("out", "in")]
+    assert found == [*strokes, ("cycle_leakage", "")]
+    assert len(Target.several(text, both=False)) == 3
+    with pytest.raises(NoDesignError, match="several targets must be bounds"):
+        Target.several("friction -10% leakage below 1 mm3 a cycle", both=True)
 
 
 def test_several_keys_change_by_the_least_sum_of_squares() -> None:

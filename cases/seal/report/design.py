@@ -62,6 +62,11 @@ def _summary(design: Design) -> Part:
                 f"and {lever.title} {later:.5g} {lever.unit} instead of {earlier:.5g} {lever.unit}"
                 for lever, earlier, later in design.moved[1:]
             ),
+            *(
+                f"{each.title} {value:.4g} {each.unit} (wanted {each.wanted})"
+                for each, value in zip(design.targets, last.values, strict=False)
+                if each != target
+            ),
             _rate(design),
             f"this is {_what(design)} at {p.speeds[0]:g} mm/s and "
             f"{p.sealed_pressure:g} MPa; softehl run with {by.name} = {after:.5g} shows "
@@ -74,7 +79,7 @@ def _what(design: Design) -> str:
     """The stroke of a design, or its cycle."""
     if design.target.quantity == CYCLE:
         return f"a cycle of {design.parameters.travel:g} mm out and back"
-    return f"the {style.STROKES[design.parameters.stroke]}"
+    return f"the {style.STROKES[design.target.stroke or design.parameters.stroke]}"
 
 
 def _rate(design: Design) -> str:

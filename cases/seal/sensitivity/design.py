@@ -1,8 +1,9 @@
 """Design: values of one or several keys that bring a quantity of a film to a target.
 
 Log-linear steps by exact sensitivities, each followed by a nonlinear solve on a mesh of its own;
-near a target that is an equation the mesh is frozen, so that the steps settle. Several keys change
-by the least sum of squares of their relative changes.
+near a target that is an equation the mesh is frozen, so that the steps settle. Several bounds are
+met by the least change of the key that meets all of them. Several keys change by the least sum of
+squares of their relative changes.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.observer import Observer
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.harness.units import read_quantity
+from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.gland.fit_geometry import DIAMETERS
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import OF_PISTON
@@ -53,6 +55,12 @@ CYCLE = "cycle_leakage"
 TARGETS = {**CALLED, CYCLE: ("leakage of a cycle", "mm3")}
 """Name of a quantity that may be a target -> what a reader calls it, and its unit."""
 
+IN_BOTH = ("h_star", "friction", "p_max", "contact_width")
+"""Quantities of which a bound holds in both strokes, unless the case has one stroke."""
+
+_NEXT = re.compile(rf"(?:[\s,;]|\band\b)+(?=(?:h\*|{'|'.join(TARGETS)})(?!\w))")
+"""Place between two targets."""
+
 _CHANGE = re.compile(r"(?P<name>\w+)\s*=?\s*(?P<change>[-+]\d+(\.\d*)?)\s*%")
 _SIDES = {
     "below": r"below|under|at most|less than|<=?|\u2264",
@@ -80,13 +88,38 @@ class NoDesignError(BadInput):
 class Target:
     """Target of a quantity: a factor of its first value, a value, or a bound.
 
-    side: "below" or "above" of a bound, else empty.
+    side: "below" or "above" of a bound, else empty. stroke: that it is for, empty where the case
+    has one.
     """
 
     quantity: str
     factor: float | None = None
     value: float = 0.0
     side: Literal["below", "above", ""] = ""
+    stroke: Literal["out", "in", ""] = ""
+
+    @classmethod
+    def several(cls, text: str, *, both: bool) -> list[Target]:
+        """From "friction below 5 N and leakage below 1 mm3 a cycle".  Raises NoDesignError.
+
+        both: whether a bound holds in both strokes.
+        """
+        targets = [cls.of(part) for part in _NEXT.split(text.strip())]
+        if len(targets) > 1 and not all(target.side for target in targets):
+            raise NoDesignError(
+                f'"{text}": several targets must be bounds, as in "friction below 5 N and leakage '
+                'below 1 mm3 a cycle"'
+            )
+        strokes: tuple[Stroke, ...] = ("out", "in")
+        return [
+            each
+            for target in targets
+            for each in (
+                [replace(target, stroke=stroke) for stroke in strokes]
+                if both and target.side and target.quantity in IN_BOTH
+                else [target]
+            )
+        ]
 
     @classmethod
     def of(cls, text: str) -> Target:
@@ -148,6 +181,12 @@ class Target:
         """True if a value is on the right side of a bound; False without one."""
         return {"below": value <= self.value, "above": value >= self.value}.get(self.side, False)
 
+    def missed(self, value: float) -> float:
+        """How far a value is from a bound, in logarithms; negative where it is held."""
+        if self.within(value) or value <= 0.0:
+            return -1.0
+        return abs(math.log(self.aim(value) / value))
+
     @property
     def wanted(self) -> str:
         """Change, value or bound in words."""
@@ -157,8 +196,14 @@ class Target:
 
     @property
     def title(self) -> str:
-        """Name of the quantity for readers."""
-        return TARGETS[self.quantity][0]
+        """Name of the quantity for readers, with its stroke."""
+        at = f", {self.stroke}stroke" if self.stroke else ""
+        return f"{TARGETS[self.quantity][0]}{at}"
+
+    @property
+    def label(self) -> str:
+        """Name of the quantity as it is typed, with its stroke."""
+        return f"{self.quantity} {self.stroke}".rstrip()
 
     @property
     def unit(self) -> str:
@@ -167,7 +212,7 @@ class Target:
 
     def value_text(self, value: float) -> str:
         """A value of the quantity as it is typed."""
-        return f"{self.quantity} = {value:.5g} {self.unit}"
+        return f"{self.label} = {value:.5g} {self.unit}"
 
 
 @dataclass(frozen=True)
@@ -233,13 +278,14 @@ class DesignStep:
     """A value of the key, and the quantity there by a nonlinear solve.
 
     state: the film; None on a mesh that is held, where only the quantity is known. slope: d log
-    quantity / d log key, where the film is known.
+    quantity / d log key, where the film is known. values: of every target, where there are several.
     """
 
     value: float
     quantity: float
     state: FilmState | None = None
     slope: float = 0.0
+    values: tuple[float, ...] = ()
 
 
 def value_of(state: FilmState, quantity: str) -> float:
@@ -312,6 +358,9 @@ class Film:
 Solve = Callable[[Seal], Film | None]
 """The film of a case, None where there is none."""
 
+SolveAll = Callable[[Seal], list[Film] | None]
+"""The film of each target of a case, None where one is not there."""
+
 
 def changed(p: Seal, message: str, **keys: Any) -> Seal:
     """The case with other values of some keys.
@@ -326,38 +375,22 @@ def changed(p: Seal, message: str, **keys: Any) -> Seal:
 
 
 def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[DesignStep]:
-    """Steps to the value of the key of a lever that meets the target; the last one does.
+    """Steps to the value of the key of a lever that meets a change or a value; the last one does.
 
-    A bound that is met from the start has one step. Raises NoDesignError.
+    Raises NoDesignError.
     """
-    called, value = p.called(by.key), float(getattr(p, by.key))
+    value = float(getattr(p, by.key))
     film = _film(p, by, solve)
     steps = [DesignStep(value, film.value, film.state, film.slope(by))]
-    if target.within(film.value):
-        return steps
-    goal = target.aim(film.value)
+    goal = target.goal(film.value)
     for _ in range(STEPS):
         slope = film.slope(by)
-        if film.value <= 0.0:
-            raise NoDesignError(
-                f"the seal returns what it takes out with {by.value_text(p)}: its leakage is "
-                f"{film.value:.3g} {target.unit}, and {goal:.5g} is not reached in per cent of that"
-            )
-        log_change = math.log(goal / steps[-1].quantity)
-        if abs(log_change) > 0.5 * abs(slope):  # the key would change by more than half
-            raise NoDesignError(
-                f"{target.quantity} follows {called} by {slope:.2g} % for 1 %: that is too "
-                "little for this target; choose another key or several (sensitivity.csv shows "
-                "which have an influence)"
-            )
-        value *= math.exp(log_change / slope)
-        message = f"the target needs a {called} that a case cannot have"
+        value *= math.exp(_log_change(p, target, goal, by, film))
+        message = f"the target needs a {p.called(by.key)} that a case cannot have"
         changed_case = changed(p, message, **by.keys_at(p, value))
         film = _film(changed_case, by, solve)
         steps.append(DesignStep(value, film.value, film.state, film.slope(by)))
-        if target.within(film.value):
-            return steps
-        if not target.side and abs(film.value / goal - 1.0) <= TOLERANCE:
+        if abs(film.value / goal - 1.0) <= TOLERANCE:
             if target.quantity == CYCLE:  # a difference of two films, each on its own mesh
                 return steps
             value_near, wanted = by.value_text(changed_case), target.value_text(goal)
@@ -367,6 +400,77 @@ def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[DesignSte
         f"{target.value_text(steps[-1].quantity)} after {STEPS} solves, wanted was "
         f"{target.wanted}: ask for a smaller change"
     )
+
+
+def bounded(
+    p: Seal, targets: Sequence[Target], main: int, by: Lever, solve: SolveAll
+) -> list[DesignStep]:
+    """Steps to the value of the key of a lever that holds every bound; the last one does.
+
+    main: index of the target whose quantity the steps have. Bounds that hold from the start need
+    one step. Each step is the least change by which all bounds hold to first order. Raises
+    NoDesignError.
+    """
+    value, case, steps = float(getattr(p, by.key)), p, list[DesignStep]()
+    for _ in range(STEPS + 1):
+        films = _films(case, by, solve)
+        film, values = films[main], tuple(film.value for film in films)
+        steps.append(DesignStep(value, film.value, film.state, film.slope(by), values))
+        if all(target.within(v) for target, v in zip(targets, values, strict=True)):
+            return steps
+        least, most = (-math.inf, targets[main]), (math.inf, targets[main])
+        for target, film in zip(targets, films, strict=True):
+            slope, holds = film.slope(by), target.within(film.value)
+            if holds and (film.value <= 0.0 or slope == 0.0):
+                continue  # the seal returns its oil, or the key does not matter
+            if holds:
+                limit = math.log(target.value / film.value) / slope
+            else:
+                limit = _log_change(case, target, target.aim(film.value), by, film)
+            if (target.side == "below") == (slope > 0.0):
+                most = min(most, (limit, target), key=lambda end: end[0])
+            else:
+                least = max(least, (limit, target), key=lambda end: end[0])
+        if least[0] > most[0]:
+            needs = [_need(p, by, value, *end, above=end is least) for end in (most, least)]
+            raise NoDesignError(
+                f"no {by.name} holds all bounds: {' and '.join(needs)} (to first order from "
+                f"{by.value_text(case)}); choose another key or several, or other bounds"
+            )
+        value *= math.exp(min(max(0.0, least[0]), most[0]))
+        message = f"the targets need a {p.called(by.key)} that a case cannot have"
+        case = changed(p, message, **by.keys_at(p, value))
+    texts = [t.value_text(v) for t, v in zip(targets, steps[-1].values, strict=True)]
+    raise NoDesignError(
+        f"{', '.join(texts)} after {STEPS} solves, wanted was "
+        f"{' and '.join(f'{t.label} {t.wanted}' for t in targets)}: ask for a smaller change"
+    )
+
+
+def _need(p: Seal, by: Lever, value: float, limit: float, target: Target, *, above: bool) -> str:
+    """The bound of a lever that a target needs, in words; limit: log change of the key."""
+    ends = [p.model_copy(update=by.keys_at(p, value * math.exp(limit + d))) for d in (0.0, 1e-6)]
+    measure, more = (by.value(end) for end in ends)
+    side = "above" if above == (more > measure) else "below"
+    return f"{target.label} {target.wanted} needs it {side} {measure:.4g} {by.unit}".rstrip()
+
+
+def _log_change(p: Seal, target: Target, goal: float, by: Lever, film: Film) -> float:
+    """Log change of the key of a lever to a goal, to first order.  Raises NoDesignError."""
+    slope = film.slope(by)
+    if film.value <= 0.0:
+        raise NoDesignError(
+            f"the seal returns what it takes out with {by.value_text(p)}: its leakage is "
+            f"{film.value:.3g} {target.unit}, and {goal:.5g} is not reached in per cent of that"
+        )
+    log_change = math.log(goal / film.value)
+    if abs(log_change) > 0.5 * abs(slope):  # the key would change by more than half
+        raise NoDesignError(
+            f"{target.label} follows {p.called(by.key)} by {slope:.2g} % for 1 %: that is too "
+            "little for this target; choose another key or several (sensitivity.csv shows "
+            "which have an influence)"
+        )
+    return log_change / slope
 
 
 def joint_lever(p: Seal, levers: Sequence[Lever], film: Film) -> Lever:
@@ -414,13 +518,19 @@ def settled(
 
 def _film(p: Seal, by: Lever, solve: Solve) -> Film:
     film = solve(p)
-    if film is None or film.doubt:
-        doubt = "did not converge" if film is None else film.doubt
+    (found,) = _films(p, by, lambda _: None if film is None else [film])
+    return found
+
+
+def _films(p: Seal, by: Lever, solve: SolveAll) -> list[Film]:
+    films = solve(p)
+    doubt = "did not converge" if films is None else next((f.doubt for f in films if f.doubt), "")
+    if films is None or doubt:
         raise NoDesignError(
             f"with {by.value_text(p)} the film {doubt}: no sensitivities of it; use a "
             "larger density, or ask for a smaller change"
         )
-    return film
+    return films
 
 
 _SPEED = "not by the speed: sensitivity.csv has U, and each of `speeds` is a row of a run"
@@ -439,15 +549,17 @@ INSTEAD = {
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A target that is met.
+    """A target that is met, or several bounds.
 
-    parameters: the case of one film that it began with. by: what was changed.
+    parameters: the case of one film that it began with. target: of several the one that was missed
+    most. by: what was changed.
     """
 
     parameters: Seal
     target: Target
     by: Lever
     steps: Sequence[DesignStep]
+    targets: Sequence[Target] = ()
 
     @property
     def met(self) -> Seal:
@@ -485,19 +597,35 @@ def design_case(p: Seal, target: str, keys: Sequence[str], observer: Observer) -
     behind = [lever.key for lever in levers]
     if twice := [lever.name for lever in levers if behind.count(lever.key) > 1]:
         raise BadInput(f"--by {' and '.join(twice)} decide one key; give one of them")
-    goal, p = Target.of(target), _one_film(p)
-    films = dict[Seal, Film | None]()
+    targets = Target.several(target, both=p.stroke == "both")
+    p, by = _one_film(p), levers[0]
+    films = dict[Seal, HeldFilm | None]()
 
-    def solve(q: Seal) -> Film | None:
-        if q not in films:
-            films[q] = _solved(q, goal.quantity, by, observer)
-        return films[q]
+    def held(q: Seal, stroke: Stroke) -> HeldFilm | None:
+        case = q if q.stroke == stroke else q.model_copy(update={"stroke": stroke})
+        if case not in films:
+            films[case] = HeldFilm.of(case, observer)
+        return films[case]
 
-    by = levers[0]
-    if len(levers) > 1:
-        by = joint_lever(p, levers, _film(p, by, solve))
-        films.clear()  # their held meshes are those of one key
-    return Design(p, goal, by, designed(p, goal, by, solve))
+    def solve(q: Seal) -> list[Film] | None:
+        found = [_film_of(q, each, by, held) for each in targets]
+        return None if None in found else [film for film in found if film]
+
+    def solve_first(q: Seal) -> Film | None:
+        found = solve(q)
+        return found[0] if found else None
+
+    main = 0
+    if targets[0].side or len(levers) > 1:
+        first = _films(p, by, solve)
+        missed = [each.missed(film.value) for each, film in zip(targets, first, strict=True)]
+        main = missed.index(max(missed))
+        by = joint_lever(p, levers, first[main]) if len(levers) > 1 else by
+    if targets[0].side:
+        steps = bounded(p, targets, main, by, solve)
+    else:
+        steps = designed(p, targets[0], by, solve_first)
+    return Design(p, targets[main], by, steps, targets)
 
 
 def _lever(p: Seal, key: str) -> Lever:
@@ -511,19 +639,19 @@ def _lever(p: Seal, key: str) -> Lever:
     return Lever(name if name in BASES else p.called(base), base)
 
 
-def _solved(q: Seal, quantity: str, by: Lever, observer: Observer) -> Film | None:
-    """The film of a case, or for a cycle those of both strokes."""
-    held = HeldFilm.of(q, observer)
-    if held is None or quantity != CYCLE:
-        change = partial(held.change, quantity, by.exponents) if held else None
-        return Film.of(held.state, quantity, change) if held and change else None
-    other = HeldFilm.of(
-        q.model_copy(update={"stroke": "in" if q.stroke == "out" else "out"}), observer
-    )
-    if other is None:
+def _film_of(
+    q: Seal, target: Target, by: Lever, held: Callable[[Seal, Stroke], HeldFilm | None]
+) -> Film | None:
+    """The film of a target in a case, or for a cycle those of both strokes."""
+    if target.quantity == CYCLE:
+        out, back = held(q, "out"), held(q, "in")
+        return Film.of_cycle(out.state, back.state, q.travel) if out and back else None
+    assert q.stroke != "both"
+    film = held(q, target.stroke or q.stroke)
+    if film is None:
         return None
-    out, back = (held, other) if q.stroke == "out" else (other, held)
-    return Film.of_cycle(out.state, back.state, q.travel)
+    change = partial(film.change, target.quantity, by.exponents)
+    return Film.of(film.state, target.quantity, change)
 
 
 def _one_film(p: Seal) -> Seal:
@@ -590,26 +718,29 @@ def design_lines(design: Design) -> list[str]:
     """A design in words: its steps, and what it comes to."""
     p, target, steps = design.parameters, design.target, design.steps
     first, last = steps[0], steps[-1]
-    sign = 1.0 if p.stroke == "out" else -1.0
     name, unit = design.by.name, f" {design.by.unit}".rstrip()
     values = [design.measure(step.value) for step in steps]
-    strokes = f"{sign * p.speeds[0]:+g} mm/s"
-    if target.quantity == CYCLE:
-        strokes = f"+-{p.speeds[0]:g} mm/s, a cycle of {p.travel:g} mm out and back"
-    lines = [f"p_s = {p.sealed_pressure:g} MPa, U = {strokes}"]
-    lines += [
-        f"  {name} = {value:.8g}{unit}: {target.value_text(step.quantity)}"
-        for step, value in zip(steps, values, strict=True)
-    ]
+    targets = design.targets or (target,)
+    lines = [f"p_s = {p.sealed_pressure:g} MPa, U = {_strokes(design)}"]
+    for step, value in zip(steps, values, strict=True):
+        quantities_there = step.values or (step.quantity,)
+        texts = [t.value_text(v) for t, v in zip(targets, quantities_there, strict=True)]
+        lines.append(f"  {name} = {value:.8g}{unit}: {', '.join(texts)}")
     if len(steps) == 1:
-        return [*lines, f"{target.quantity} is {target.wanted} already; nothing needs to change"]
+        holding = [f"{each.label} is {each.wanted}" for each in targets]
+        return [*lines, f"{' and '.join(holding)} already; nothing needs to change"]
     moved = 100.0 * (values[-1] / values[0] - 1.0)
     alone = 100.0 * (steps[1].quantity / first.quantity - 1.0)
     lines.append(
-        f"{target.quantity} {design.change:+.2f} % (wanted {target.wanted}) by {name} = "
+        f"{target.label} {design.change:+.2f} % (wanted {target.wanted}) by {name} = "
         f"{values[-1]:.8g}{unit} ({moved:+.3f} %); by the first sensitivity alone: "
         f"{values[1]:.8g}{unit}, which gives {alone:+.2f} %"
     )
+    lines += [
+        f"  and {each.value_text(value)} ({each.wanted})"
+        for each, value in zip(targets, last.values, strict=False)
+        if each != target
+    ]
     for lever, before, after in design.moved[1:]:
         lines.append(
             f"  and {lever.name} = {after:.8g} {lever.unit}".rstrip()
@@ -621,3 +752,14 @@ def design_lines(design: Design) -> list[str]:
             previous, later = (decided.value(design.at(step.value)) for step in (first, last))
             lines.append(f"{decided.name} from {previous:.5g} to {later:.5g} mm")
     return lines
+
+
+def _strokes(design: Design) -> str:
+    """Speeds and strokes of a design in words."""
+    p, targets = design.parameters, design.targets or (design.target,)
+    speed = p.speeds[0]
+    if any(target.quantity == CYCLE for target in targets):
+        return f"+-{speed:g} mm/s, a cycle of {p.travel:g} mm out and back"
+    if any(target.stroke for target in targets):
+        return f"+-{speed:g} mm/s"
+    return f"{speed if p.stroke == 'out' else -speed:+g} mm/s"
