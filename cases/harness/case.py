@@ -101,8 +101,8 @@ class Case(Generic[P, R]):
         return self.title
 
     def named(self, rows: Sequence[R]) -> str:
-        """Some rows in words."""
-        return ", ".join(row.label(row.key) for row in rows)
+        """Some rows in words: "U = +200, +100 mm/s"."""
+        return self.row.labels([row.key for row in rows])
 
     def complaints(
         self, parameters: P, rows: Sequence[R], rejected: Sequence[R], advice: str

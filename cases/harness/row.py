@@ -139,6 +139,13 @@ class Row(Record):
         column = cls.key_column()
         return f"{column.head} = {column.show(key)} {column.unit}".rstrip()
 
+    @classmethod
+    def labels(cls, keys: Sequence[float]) -> str:
+        """Rows of which nothing is known but their keys, in words: "U = +200, +100 mm/s"."""
+        column = cls.key_column()
+        shown = ", ".join(column.show(key) for key in keys)
+        return f"{column.head} = {shown} {column.unit}".rstrip() if shown else ""
+
     @property
     def name(self) -> str:
         """The part of a file name that tells this row from the others of its folder: key and unit.
@@ -146,6 +153,10 @@ class Row(Record):
         A unit has no slash there: "100mm_s".
         """
         return f"{number_text(self.key)}{self.key_column().unit.replace('/', '_')}"
+
+    def shown(self, column: Column) -> str:
+        """The text of a cell of this row on the terminal."""
+        return column.show(getattr(self, column.name))
 
     @property
     def order(self) -> tuple[Any, ...]:

@@ -233,7 +233,7 @@ def _gaps(record: RunRecord) -> list[str]:
     """The requested states that are not results, and why not."""
     run, rows, rejected = record.run, record.curve.rows, record.rejected.rows
     reached = {row.key for row in [*rows, *rejected]}
-    missed = [run.case.row.label(k) for k in run.case.requested(run.parameters) if k not in reached]
-    gaps = [f"not reached: {', '.join(missed)}"] if missed else []
+    missed = [key for key in run.case.requested(run.parameters) if key not in reached]
+    gaps = [f"not reached: {run.case.row.labels(missed)}"] if missed else []
     advice = " ".join(sorted({record.advice.get(row.key, "") for row in rejected}))
     return [*gaps, *run.case.complaints(run.parameters, rows, rejected, advice)]

@@ -119,7 +119,7 @@ def _heads(kind: type[Record]) -> list[list[Column]]:
 
 
 def _cell_text(row: Row, columns: Sequence[Column]) -> str:
-    return " ".join(column.show(getattr(row, column.name)) for column in columns).strip()
+    return " ".join(row.shown(column) for column in columns).strip()
 
 
 def _print(table: Table, width: int) -> None:

@@ -383,7 +383,7 @@ def test_a_tolerance_that_no_mesh_meets_is_named(here: Path, invoke: Invoke) -> 
     tolerance = ("--tolerance", "0.01")
     code, _, err = invoke("run", "oring", *FAST, *tolerance, solver=solve_roughly)
     assert code == NOT_CONVERGED
-    assert "h* not known to 0.01 %: U = +100 mm/s, U = -100 mm/s" in err[-1]
+    assert "h* not known to 0.01 %: U = +100, -100 mm/s" in err[-1]
     assert {row[-2] for row in rows(here / "results" / "oring")} == {"16"}
 
 
@@ -394,7 +394,7 @@ def test_not_converged(here: Path, invoke: Invoke) -> None:
     assert speeds(folder) == [400.0]
     assert run_json(folder)["status"] == "not converged"
     assert err[-1].startswith("softehl: not converged: continuation step too small: stopped at U =")
-    assert "not reached: U = +100 mm/s, U = -400 mm/s, U = -100 mm/s" in err[-1]
+    assert "not reached: U = +100, -400, -100 mm/s" in err[-1]
     assert "reached and saved in results/oring: U = +400 mm/s" in err[-1]
     assert any("+400" in line for line in out)
 

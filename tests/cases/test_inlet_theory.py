@@ -34,6 +34,7 @@ from softehl.cases.seal.states.estimated import FILMS, contact_of, estimated_sta
 from softehl.cases.seal.states.inlet_edges import predicted
 from softehl.cases.seal.states.leakage import net_leakage
 from softehl.cases.seal.states.state import ESTIMATED, UNCERTAIN, Silent
+from softehl.cases.seal.states.summary import run_summary
 from softehl.cases.seal.states.verdict import MOST_OFF_THEORY, Verdict
 from tests.cases.test_results import NUMBERS
 
@@ -193,6 +194,10 @@ def test_estimated_states() -> None:
     assert net.verdict == ESTIMATED
     errors = 0.03 * out.h_star_um + back.h_star_um
     assert net.net_error_percent == pytest.approx(100.0 * errors / net.net_film_um)
+    _, line = run_summary(rows, 100.0)
+    assert "friction not known (both strokes estimated)" in line
+    (error,) = [column for column in out.columns() if column.name == "h_star_error_percent"]
+    assert out.shown(error) == "\u00b13"
     rough = high.model_copy(update={"roughness": (0.0, 0.3)})
     state = estimated_state(rough, contact.system, contact.x, "in", 100.0)
     assert state is not None

@@ -69,7 +69,7 @@ def row(speed: float, film: float, verdict: str = OK, sealed_pressure: float = 1
         (
             [row(-400.0, 1.1, UNCERTAIN)],
             "leakage is not known: no speed has a film of both strokes",
-            "leakage needs both strokes; friction 3 N in (in uncertain)",
+            "leakage needs both strokes; friction 3 N in (instroke uncertain)",
         ),
     ],
 )

@@ -15,6 +15,7 @@ from softehl.cases.harness.parameters import keys_of
 from softehl.cases.harness.report.page import capital, input_part, left_out, read_finished
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
 from softehl.cases.harness.responses import titled, titled_value
+from softehl.cases.harness.resume import advice_of
 from softehl.runtime.io import Cell, read_json
 
 _COLUMNS = 12  # of a table at most: random points have a value of their own each
@@ -129,12 +130,14 @@ def _value(text: str) -> Cell:
 def _best(sweep: FinishedSweep) -> Part:
     """The runs with the least and the largest number of each kind."""
     rows: list[Sequence[Cell]] = []
+    named = dict[int, Point]()
     for name in sweep.names:
         finite = [p for p in sweep.points if isfinite(p.merit(name))]
         if not finite:
             continue
         best = min(finite, key=lambda p: p.merit(name) * sweep.case.sense(name))
         worst = max(finite, key=lambda p: p.merit(name) * sweep.case.sense(name))
+        named |= {p.number: p for p in (best, worst)}
         cells = [
             cell
             for p in (best, worst)
@@ -148,6 +151,12 @@ def _best(sweep: FinishedSweep) -> Part:
     failed = [p for p in sweep.points if p.status != "converged"]
     lines = [
         f"run {p.number}, {sweep.values_text(p, list(sweep.keys))}: {p.status}" for p in failed
+    ]
+    lines += [
+        f"run {p.number}, {sweep.values_text(p, list(sweep.keys))}: {note}"
+        for p in named.values()
+        if p.run is not None
+        for note in p.run.case.notes(p.run.rows, advice_of(p.run.content, p.run.rows))
     ]
     return Part("Best and worst", tables=[table], lines=lines)
 

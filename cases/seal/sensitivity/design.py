@@ -182,7 +182,7 @@ class Target:
         return {"below": value <= self.value, "above": value >= self.value}.get(self.side, False)
 
     def missed(self, value: float) -> float:
-        """How far a value is from a bound, in logarithms; negative where it is held."""
+        """Logarithmic distance of a value from a bound; negative where the bound is held."""
         if self.within(value) or value <= 0.0:
             return -1.0
         return abs(math.log(self.aim(value) / value))

@@ -10,7 +10,7 @@ from typing import Any
 
 from softehl.cases.harness.file_content import Cells
 from softehl.cases.harness.observer import Observer
-from softehl.cases.harness.row import OK, Row, column
+from softehl.cases.harness.row import OK, Column, Row, column
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import number_text
 
@@ -82,7 +82,8 @@ class FilmRow(Row):
     )
     h_star_error_percent: float = column(
         "%",
-        "estimated error of h*, + where it is too large; nan where not known",
+        "estimated error of h*, + where it is too large; of an `estimated` state the largest one, "
+        "of either sign; nan where not known",
         head="error",
         number_format="+.2f",
         default=nan,
@@ -211,6 +212,12 @@ class FilmRow(Row):
         point = f"p_s = {self.sealed_pressure_MPa:g} MPa, U = {self.rod_speed_mm_s:+g} mm/s"
         value = f"h* = {self.h_star_um:.4g} um" if self.usable else f"{self.verdict}: not a result"
         return f"{point}: {value}"
+
+    def shown(self, column: Column) -> str:
+        """See :class:`Row`; the error of an estimated state has no sign."""
+        if self.verdict == ESTIMATED and column.name == "h_star_error_percent":
+            return f"\u00b1{self.h_star_error_percent:g}"
+        return super().shown(column)
 
     @property
     def thickness_um(self) -> float:

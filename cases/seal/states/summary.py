@@ -102,16 +102,23 @@ def _whether(speeds: Sequence[_Speed], travel: float) -> str:
 def _line(speed: _Speed, travel: float, stroke: str, service: str | None) -> str:
     """A speed: leakage, friction, least lambda."""
     strokes = speed.strokes
-    forces = [f"{_force(row)} {stroke}" for stroke, row in strokes.items()]
-    parts = [f"friction {', '.join(forces)}", *_ratio(strokes)]
+    parts = [f"friction {_forces(strokes)}", *_ratio(strokes)]
     if speed.net is not None or stroke == "both":
         parts.insert(0, _leakage(speed, travel, service))
-    reservations = [
-        f"{stroke} {row.verdict}" for stroke, row in strokes.items() if row.verdict != OK
-    ]
-    doubt = f" ({', '.join(reservations)})" if reservations else ""
+    verdicts = {f"{stroke}stroke": row.verdict for stroke, row in strokes.items()}
+    doubted = [f"{name} {word}" for name, word in verdicts.items() if word != OK]
+    if len(doubted) == 2 and len(set(verdicts.values())) == 1:
+        doubted = [f"both strokes {next(iter(verdicts.values()))}"]
+    doubt = f" ({', '.join(doubted)})" if doubted else ""
     line, thin = f"  {speed.speed:g} mm/s: {'; '.join(parts)}{doubt}", _thin(strokes)
     return Alarm(f"{line}; {thin}") if thin else line
+
+
+def _forces(strokes: Mapping[str, FilmRow]) -> str:
+    """The friction of each stroke in words."""
+    if not any(isfinite(row.rod_friction_N) for row in strokes.values()):
+        return "not known"
+    return ", ".join(f"{_force(row)} {stroke}" for stroke, row in strokes.items())
 
 
 def _force(row: FilmRow) -> str:
