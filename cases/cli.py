@@ -391,14 +391,14 @@ def design(
             raise BadInput(f"--report {str(page)!r}: there is no folder {str(page.parent)!r}")
     with make_display(read.case.foreword(read.parameters), quiet=False) as display:
         observer = DisplayObserver(display, read.case)
-        found = design_case(read.parameters, " ".join(target), by, observer)
-    for line in design_lines(found):
+        result = design_case(read.parameters, " ".join(target), by, observer)
+    for line in design_lines(result):
         click.echo(line)
     if page is not None:
         from softehl.cases.seal.report.design import design_parts, design_title
 
-        parts = design_parts(found, read.case)
-        title = design_title(found, read.case.titled(read.parameters))
+        parts = design_parts(result, read.case)
+        title = design_title(result, read.case.titled(read.parameters))
         _write(page, [], parts, title, quiet=False)
     return 0
 

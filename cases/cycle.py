@@ -16,7 +16,7 @@ from softehl.cases.harness.parameters import key
 from softehl.cases.harness.pictures import KINDS, draw_columns, save
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Row, column
-from softehl.cases.seal.cycle.motion import Motion, motion_keys
+from softehl.cases.seal.cycle.motion import RodMotion, motion_keys
 from softehl.cases.seal.gland.messages import assumed, foreword, warnings
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import MIXED
@@ -100,14 +100,14 @@ class Cycle(Seal):
         return True
 
     @property
-    def path(self) -> Motion:
+    def path(self) -> RodMotion:
         """The motion of the rod."""
         pressure = self.pressures or self.sealed_pressure
         if self.motion is not None:
-            return Motion.of(self.motion, pressure)
+            return RodMotion.of(self.motion, pressure)
         if self.shape == "sine":
-            return Motion.sine(self.travel, self.frequency, pressure)
-        return Motion.trapezoid(self.travel, self.frequency, self.ramp, pressure)
+            return RodMotion.sine(self.travel, self.frequency, pressure)
+        return RodMotion.trapezoid(self.travel, self.frequency, self.ramp, pressure)
 
 
 _OF_STEADY_FILMS = (

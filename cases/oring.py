@@ -111,15 +111,15 @@ class ORingCase(Case[Seal, FilmRow]):
 
     def merits(self, parameters: Seal, rows: Sequence[FilmRow]) -> Mapping[str, float]:
         """See :class:`Case`; of all speeds the worst."""
-        found = {
+        merits = {
             "largest friction [N]": _worst(abs(row.rod_friction_N) for row in rows),
             _THINNEST: min(row.thickness_um for row in rows),
         }
         if nets := net_leakage(rows):
             volume = parameters.travel * max(net.net_mm3_per_mm for net in nets)
             cycle = f"leakage in a cycle of {parameters.travel:g} mm out and back [mm3]"
-            return {cycle: volume, **found}
-        return found
+            return {cycle: volume, **merits}
+        return merits
 
     def sense(self, merit: str) -> float:
         """See :class:`Case`."""
@@ -138,14 +138,14 @@ class ORingCase(Case[Seal, FilmRow]):
     ) -> list[str]:
         """See :class:`Case`."""
         reservations = run_plan.reservations(rows, advice)
-        doubts = [f"{text}: {self.named(some)}" for text, some in reservations.items()]
+        warnings = [f"{text}: {self.named(some)}" for text, some in reservations.items()]
         thin = [row for row in rows if not row.regime and row.thickness_um < run_plan.THIN]
         if not thin:
-            return doubts
+            return warnings
         text = (
             f"films below {run_plan.THIN:g} um, where surfaces of {run_plan.USUAL:g} um rms touch"
         )
-        return [*doubts, f"smooth surfaces: {text}: {self.named(thin)}; give their roughness"]
+        return [*warnings, f"smooth surfaces: {text}: {self.named(thin)}; give their roughness"]
 
     def cautions(self, parameters: Seal) -> list[str]:
         """See :class:`Case`."""

@@ -37,7 +37,7 @@ from softehl.cases.shipped import SHIPPED
 
 
 @dataclass(frozen=True)
-class Choice:
+class KeyChoice:
     """A key of a case: what it is called on the desk, what it begins with, what is offered."""
 
     key: str
@@ -78,24 +78,24 @@ _OILS = (
 )
 
 CHOICES = (
-    Choice("ring", "Seal", "ISO 3601 36x4", _RINGS),
-    Choice("rod", "Rod, or bore of a piston", "36 f7", ()),
-    Choice("compound", "Rubber", "NBR 70", _RUBBERS),
-    Choice("oil", "Oil", "HLP 46", _OILS),
-    Choice("temperature", "Temperature", "40 degC", [f"{t} degC" for t in range(20, 101, 10)]),
-    Choice(
+    KeyChoice("ring", "Seal", "ISO 3601 36x4", _RINGS),
+    KeyChoice("rod", "Rod, or bore of a piston", "36 f7", ()),
+    KeyChoice("compound", "Rubber", "NBR 70", _RUBBERS),
+    KeyChoice("oil", "Oil", "HLP 46", _OILS),
+    KeyChoice("temperature", "Temperature", "40 degC", [f"{t} degC" for t in range(20, 101, 10)]),
+    KeyChoice(
         key="sealed_pressure",
         label="Sealed pressure",
         value="10 bar",
         options=[f"{p} bar" for p in (1, 2, 6, 10, 16, 25, 40, 63, 100, 160)],
     ),
-    Choice(
+    KeyChoice(
         key="roughness",
         label="Surface of the seal",
         value="smooth",
         options=["smooth", *(f"Ra {height}" for height in (0.1, 0.2, 0.4, 0.8))],
     ),
-    Choice("gland", "Gland", "hydraulic", ["hydraulic", "pneumatic"]),
+    KeyChoice("gland", "Gland", "hydraulic", ["hydraulic", "pneumatic"]),
 )
 """All that is chosen by one text, in the order of the desk."""
 
@@ -132,8 +132,8 @@ def rods(ring: str) -> list[str]:
             (inner, ceil(1.02 * inner)) if of_any_size else (ceil(inner), round(1.02 * inner, 1))
         )
     texts = dict.fromkeys(map(number_text, sizes))
-    found = [f"{size}{fit}" for size in texts for fit in _FITS]
-    return [*found, *(f"{BORE}{number_text(bore)}{fit}" for fit in _HOLES)]
+    values = [f"{size}{fit}" for size in texts for fit in _FITS]
+    return [*values, *(f"{BORE}{number_text(bore)}{fit}" for fit in _HOLES)]
 
 
 _HOLES = (" H8", " H9", "")
@@ -208,22 +208,22 @@ class Form:
 
     def values(self) -> dict[str, Any]:
         """The keys of the case.  Raises BadInput for another key that cannot be read."""
-        found: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for key, widget in self.widgets.items():
             value = widget.value_input or widget.value if key in _TEXTS else widget.value
             value = value.strip() if isinstance(value, str) else value
             if key != "more" and value and value != "smooth":
-                found[key] = value
-        if str(found.get("ring", "")).lower().startswith(_BY_GROOVE):
-            found.pop("gland", None)
-        if isinstance(rod := found.pop("rod", None), str):
+                values[key] = value
+        if str(values.get("ring", "")).lower().startswith(_BY_GROOVE):
+            values.pop("gland", None)
+        if isinstance(rod := values.pop("rod", None), str):
             key, value = slides_on(rod)
-            found[key] = value
+            values[key] = value
         for line in (self.widgets["more"].value or "").splitlines():
             if line.strip():
                 key, value = read_assignment(line, _HERE)
-                found[key] = value
-        return found
+                values[key] = value
+        return values
 
     def run(self) -> tuple[Run, Mapping[str, Any]]:
         """The run that is chosen, and its keys.  Raises BadInput, in words for the page."""
@@ -274,7 +274,7 @@ _NARROW = """
 _WIDE = {"sizing_mode": "stretch_width"}
 
 
-class Page:
+class AppPage:
     """One page in a browser; the runs belong to the desk and outlive it."""
 
     def __init__(self, desk: Desk) -> None:

@@ -23,7 +23,7 @@ from bokeh.server.views.auth_request_handler import AuthRequestHandler
 from tornado.web import HTTPError, RequestHandler, authenticated
 from tornado.websocket import WebSocketClosedError
 
-from softehl.cases.app.page import Page
+from softehl.cases.app.page import AppPage
 from softehl.cases.app.runs import Desk
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.signals import Ended
@@ -172,7 +172,7 @@ def make(desk: Desk, port: int) -> tuple[Any, str]:
     token = secrets.token_urlsafe(24)
     port = port or _free_port()
     server = pn.io.server.get_server(
-        {_PAGE: lambda: Page(desk).view()},
+        {_PAGE: lambda: AppPage(desk).view()},
         port=port,
         address=HOST,
         websocket_origin=[f"{HOST}:{port}"],

@@ -151,9 +151,9 @@ def _read_file(path: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
     return name, table
 
 
-def _as_value(given: str, shipped: Shipped) -> str:
+def _as_value(text: str, shipped: Shipped) -> str:
     """Hint how to run a case whose key has a value of this name, "" where there is none."""
-    word = given.lower().replace("-", "_")
+    word = text.lower().replace("-", "_")
     for name, module in shipped.items():
         for key, field in load_case(module).parameters.model_fields.items():
             if get_origin(field.annotation) is Literal and word in get_args(field.annotation):

@@ -17,10 +17,10 @@ def unnamed_folder(first: Path, existing: Existing) -> tuple[Path, str]:
     """
     if existing == "refuse":
         others = (first.with_name(f"{first.name}-{number}") for number in count(2))
-        found = next(folder for folder in chain([first], others) if _is_free(folder))
-        return found, "" if found == first else f"{first} is taken; this run goes to {found}"
-    found = _newest(first)
-    return found, f"--{existing}: {found}" if _holds_records(found) else ""
+        output = next(folder for folder in chain([first], others) if _is_free(folder))
+        return output, "" if output == first else f"{first} is taken; this run goes to {output}"
+    output = _newest(first)
+    return output, f"--{existing}: {output}" if _holds_records(output) else ""
 
 
 def _is_free(folder: Path) -> bool:

@@ -47,10 +47,10 @@ def draw_columns(
     """
     from matplotlib.figure import Figure  # late: it is slow to import
 
-    _, *shown = names
-    figure = Figure(figsize=(5.6, 2.4 * len(shown)), layout="constrained")
-    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, name in zip(panels, shown, strict=True):
+    _, *drawn = names
+    figure = Figure(figsize=(5.6, 2.4 * len(drawn)), layout="constrained")
+    panels = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, name in zip(panels, drawn, strict=True):
         for label, columns in tables.items():
             axes.plot(columns[names[0]], columns[name], label=label)
         axes.set_ylabel(titled(name))

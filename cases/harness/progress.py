@@ -62,7 +62,7 @@ class Display:
         """A row was saved."""
 
 
-class Lines(Display):
+class ProgressLines(Display):
     """One line a stage and one a row, on stderr."""
 
     def begin_stage(self, worker: str, title: str) -> None:
@@ -166,4 +166,4 @@ def make_display(foreword: Sequence[str] = (), *, quiet: bool) -> Display:
     if quiet:
         return Display()
     console = Console(stderr=True)
-    return Bars(console, foreword) if console.is_terminal else Lines(foreword)
+    return Bars(console, foreword) if console.is_terminal else ProgressLines(foreword)

@@ -58,16 +58,16 @@ class Response:
 
         Words are empty where they would be too many to be told apart.
         """
-        column, found = self.kind.key_column().name, dict[tuple[str, str], list[Any]]()
+        column, rows_of_pair = self.kind.key_column().name, dict[tuple[str, str], list[Any]]()
         for row in self.rows:
             other = ", ".join(titled_value(key, row[key], self.keys[key]) for key in self.others)
             state = self.kind.label(float(row[column]))
-            found.setdefault((other, state), []).append(row)
-        few = [len({pair[k] for pair in found}) for k in (0, 1)]
+            rows_of_pair.setdefault((other, state), []).append(row)
+        few = [len({pair[k] for pair in rows_of_pair}) for k in (0, 1)]
         many_others, many_states = few[0] > _LABELS, few[1] > len(_MARKERS)
         return [
             ("" if many_others else other, "" if many_states else state, some)
-            for (other, state), some in found.items()
+            for (other, state), some in rows_of_pair.items()
         ]
 
 

@@ -36,7 +36,7 @@ _WANTED = "one of [grid], [[list]], [latin_hypercube], [random]"
 
 
 @dataclass(frozen=True)
-class Study:
+class StudyFile:
     """Runs of a case.
 
     scheme: how the points were chosen.  keys: those that vary.  points: their values, for each run.
@@ -51,7 +51,7 @@ class Study:
     runs: tuple[Parameters | str, ...]
 
 
-def read_study(source: str, shipped: Shipped, assignments: Iterable[str] = ()) -> Study:
+def read_study(source: str, shipped: Shipped, assignments: Iterable[str] = ()) -> StudyFile:
     """The study in a TOML file; assignments: KEY=VALUE, of keys that do not vary.  BadInput."""
     if source in shipped:
         raise BadInput(
@@ -76,7 +76,7 @@ def read_study(source: str, shipped: Shipped, assignments: Iterable[str] = ()) -
         if key in keys and schemes[0] in _REPLACING:
             raise BadInput(f"{origins[key]}: {key} is fixed and varied; allowed: one of both")
     runs = _runs(case.parameters, schemes[0], fixed, points, source)
-    return Study(case, schemes[0], fixed, keys, tuple(points), runs)
+    return StudyFile(case, schemes[0], fixed, keys, tuple(points), runs)
 
 
 def _case(source: str, table: dict[str, Any], shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:

@@ -34,7 +34,7 @@ from softehl.cases.harness.run_record import (
     require_folder,
 )
 from softehl.cases.harness.runner import NOT_CONVERGED, compute, writing
-from softehl.cases.harness.study_file import Study
+from softehl.cases.harness.study_file import StudyFile
 from softehl.folder_lock import FolderLock
 from softehl.runtime.io import Cell, number_text, read_json, write_csv, write_json
 from softehl.system import name_fault
@@ -43,7 +43,7 @@ _LONGEST = 120
 
 
 @dataclass(frozen=True)
-class Task:
+class SweepTask:
     """A curve that is to be computed: the run, its folder, what to do with what that has."""
 
     run: Run
@@ -93,7 +93,7 @@ def solve_all(
     """
     base = folder.absolute()  # a worker may have another working directory
     tasks = [
-        Task(Run(case, parameters, shared_folder(case, base)), base / name, existing)
+        SweepTask(Run(case, parameters, shared_folder(case, base)), base / name, existing)
         for name, (case, parameters) in runs.items()
     ]
     curves = {curve.folder: curve for curve in solved(tasks, executor)}
@@ -106,9 +106,9 @@ def shared_folder(case: AnyCase, base: Path) -> Path | None:
 
 
 def solved(
-    tasks: Sequence[Task],
+    tasks: Sequence[SweepTask],
     executor: Executor | None,
-    solve: Callable[[Task], Curve] | None = None,
+    solve: Callable[[SweepTask], Curve] | None = None,
 ) -> Iterator[Curve]:
     """The curves as they come in, begun in an order in which they use what others leave.
 
@@ -118,14 +118,14 @@ def solved(
         yield curve
 
 
-def solve_task(task: Task) -> Curve:
+def solve_task(task: SweepTask) -> Curve:
     """Run one curve into its folder; this is what a worker does.  Raises BadInput."""
     with RunRecord(task.folder, task.run, task.existing) as record:
         complaints = compute(record, jobs=1, display=Display())
     return Curve(task.run.parameters, task.folder, tuple(record.curve.rows), tuple(complaints))
 
 
-def kept_task(task: Task) -> Curve:
+def kept_task(task: SweepTask) -> Curve:
     """As :func:`solve_task`, but a run in which the program fails does not end the others.
 
     Raises BadInput, which no other run would be spared either.
@@ -138,7 +138,7 @@ def kept_task(task: Task) -> Curve:
         return Curve(task.run.parameters, task.folder, (), (one_line(error),), failed=True)
 
 
-def in_order(tasks: Sequence[Task]) -> list[Task]:
+def in_order(tasks: Sequence[SweepTask]) -> list[SweepTask]:
     """Tasks in the order in which they begin: the longest first, one of each shared name.
 
     Two curves that begin together would both compute what they could share.
@@ -214,11 +214,11 @@ _ENDED = {"converged": True, "not converged": False}
 class SweepRecord:
     """Everything of a sweep but its runs, kept up to date; a context that locks the folder."""
 
-    def __init__(self, folder: Path, study: Study, existing: Existing) -> None:
+    def __init__(self, folder: Path, study: StudyFile, existing: Existing) -> None:
         """Look at what is in `folder`.  Raises BadInput if it cannot hold or resume this study."""
         self.folder, self.study, self._existing = folder, study, existing
         self.curves: dict[int, Curve] = {}
-        self.missing: list[Task] = []
+        self.missing: list[SweepTask] = []
         self._lock = FolderLock(folder, error=BadInput)
         self._previous_seconds, self._began, self._saved = 0.0, time.monotonic(), 0.0
         require_folder(folder)
@@ -249,7 +249,7 @@ class SweepRecord:
             if isinstance(parameters, str):
                 continue
             folder = base / RUNS / f"{number + 1:05d}"
-            result = self._resumed(Task(Run(case, parameters, shared), folder, "resume"))
+            result = self._resumed(SweepTask(Run(case, parameters, shared), folder, "resume"))
             if isinstance(result, Curve):
                 self.curves[number] = result
             else:
@@ -323,7 +323,7 @@ class SweepRecord:
             return parameters if isinstance(parameters, str) else ""
         return "; ".join(curve.complaints)
 
-    def _resumed(self, task: Task) -> Curve | Task:
+    def _resumed(self, task: SweepTask) -> Curve | SweepTask:
         """The curve of a run that came to its end and can be believed, or what is to be done."""
         try:
             earlier = read_earlier(task.folder, task.run, package_versions()["softehl"])
@@ -467,7 +467,7 @@ def sweep_study(record: SweepRecord, workers: Workers, *, quiet: bool) -> int:
         return _finish(record, quiet=quiet)
 
 
-def _run(record: SweepRecord, tasks: Sequence[Task], workers: Workers, *, quiet: bool) -> None:
+def _run(record: SweepRecord, tasks: Sequence[SweepTask], workers: Workers, *, quiet: bool) -> None:
     with workers.executor() as executor, _progress(record, quiet=quiet) as count:
         try:
             for curve in solved(tasks, executor, kept_task):

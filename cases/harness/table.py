@@ -92,8 +92,8 @@ def default_text(key: Key) -> str:
 def key_lines(kind: type[Parameters], excluded: Collection[Key] = ()) -> list[str]:
     """The keys of a case as a table for the documentation, without those that are known."""
     lines = ["| key | default | unit | allowed | meaning |", "|---|---|---|---|---|"]
-    listed = [key for key in keys_of(kind) if key not in excluded]
-    for heading, keys in groupby(listed, key=lambda key: key.heading):
+    shown_keys = [key for key in keys_of(kind) if key not in excluded]
+    for heading, keys in groupby(shown_keys, key=lambda key: key.heading):
         if heading:
             lines.append(_line(f"**{heading}**", "", "", "", ""))
         for key in keys:

@@ -109,9 +109,9 @@ def read_quantity(text: str, unit: str) -> float:
     raise ValueError(f'"{text}" is not a number in {unit}; allowed units: {", ".join(units)}')
 
 
-def _spelt(given: str, units: Collection[str]) -> str:
+def _spelt(text: str, units: Collection[str]) -> str:
     """A unit as it is units: also from capitals or small letters alone, if they mean one unit."""
-    if given in units or (given := _SPELT.get(given, given)) in units:
-        return given
-    same = [unit for unit in units if unit.lower() == given.lower()]
-    return same[0] if len(same) == 1 and given in (given.lower(), given.upper()) else given
+    if text in units or (text := _SPELT.get(text, text)) in units:
+        return text
+    same = [unit for unit in units if unit.lower() == text.lower()]
+    return same[0] if len(same) == 1 and text in (text.lower(), text.upper()) else text

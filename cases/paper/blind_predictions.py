@@ -7,7 +7,7 @@ from typing import Any
 
 from softehl.cases.paper.checks import LETTERS, observed_order
 from softehl.cases.paper.curves import ORDERS
-from softehl.cases.paper.figure_spec import STUDY_DENSITIES, CsvTable, Item, Product, Scope
+from softehl.cases.paper.figure_spec import STUDY_DENSITIES, CsvTable, FigureContent, Item, Scope
 from softehl.cases.paper.states import PAPER, STABILISED, Request, RequestedState, Store, ask, setup
 from softehl.cases.seal.gland.records import DENSITIES
 from softehl.runtime.io import Cell
@@ -24,7 +24,7 @@ def _jump_requests(scope: Scope) -> list[Request]:
     ]
 
 
-def jumps(store: Store, scope: Scope) -> Product:
+def jumps(store: Store, scope: Scope) -> FigureContent:
     """The largest pressure jump of the DG method over density and order, and its orders."""
     u, p_s, densities = scope.speed(400.0), scope.pressure(1.0), scope.meshes(DENSITIES)
     rows: list[list[Cell]] = []
@@ -42,7 +42,7 @@ def jumps(store: Store, scope: Scope) -> Product:
         *("verdicts", "order_of_last_two"),
     )
     caption = f"Outstroke, p_s = {p_s:g} MPa, U = {u:g} mm/s."
-    return Product({"jumps": CsvTable(header, rows)}, caption)
+    return FigureContent({"jumps": CsvTable(header, rows)}, caption)
 
 
 # --- Sec. 5.3: how much the piezo-viscous effect changes ----------------------------------------
@@ -58,7 +58,7 @@ def _piezo_requests(scope: Scope) -> list[Request]:
     ]
 
 
-def piezo(store: Store, scope: Scope) -> Product:
+def piezo(store: Store, scope: Scope) -> FigureContent:
     """Changes of film by (13), the largest pressure and its viscosity, on several meshes."""
     u, p_s = scope.speed(100.0), scope.pressure(5.0)
     caption = f"p_s = {p_s:g} MPa, |U| = {u:g} mm/s, alpha = 0.02 against 0."
@@ -66,7 +66,7 @@ def piezo(store: Store, scope: Scope) -> Product:
         "piezo": _piezo_table(store, scope, PAPER),
         "piezo_stabilised": _piezo_table(store, scope, STABILISED),
     }
-    return Product(tables, caption)
+    return FigureContent(tables, caption)
 
 
 def _piezo_table(store: Store, scope: Scope, scheme: dict[str, Any]) -> CsvTable:

@@ -17,8 +17,8 @@ from softehl.cases.paper import drawing
 from softehl.cases.paper.figure_spec import (
     STUDY_DENSITIES,
     CsvTable,
+    FigureContent,
     Item,
-    Product,
     Scope,
     both,
     density_words,
@@ -53,7 +53,7 @@ def _matrix_requests(scope: Scope) -> list[Request]:
     return [ask(s, both(scope.some_speeds())) for s in _matrix_setups(scope)]
 
 
-def matrix(store: Store, scope: Scope) -> Product:
+def matrix(store: Store, scope: Scope) -> FigureContent:
     """The verdict on every state, and its numbers."""
     speeds, rows, states = scope.some_speeds(), [], []
     for p in _matrix_setups(scope):
@@ -68,7 +68,7 @@ def matrix(store: Store, scope: Scope) -> Product:
         " U under-resolved, C collapsed, - not reached, ? not run to its end."
     )
     tables = {"matrix": CsvTable(header, rows), "matrix_states": state_table(states)}
-    return Product(tables, caption)
+    return FigureContent(tables, caption)
 
 
 # --- mesh study ---------------------------------------------------------------------------------
@@ -97,7 +97,7 @@ def _study_requests(scope: Scope) -> list[Request]:
     ]
 
 
-def mesh_study(store: Store, scope: Scope) -> Product:
+def mesh_study(store: Store, scope: Scope) -> FigureContent:
     """h* over density at two sealed pressures: observed order and extrapolated value."""
     caption = (
         "h* on three meshes, the order seen in the last three and Richardson's extrapolation; nan"
@@ -107,7 +107,7 @@ def mesh_study(store: Store, scope: Scope) -> Product:
         "mesh_study": _study(store, scope, PAPER),
         "mesh_study_stabilised": _study(store, scope, STABILISED),
     }
-    return Product(tables, caption)
+    return FigureContent(tables, caption)
 
 
 def _study(store: Store, scope: Scope, scheme: dict[str, Any]) -> CsvTable:
@@ -135,7 +135,7 @@ def _leakage_setups(scope: Scope) -> list[Seal]:
     return [setup(scope.mesh(16), p) for p in scope.some_pressures(MATRIX_PRESSURES)]
 
 
-def leakage(store: Store, scope: Scope) -> Product:
+def leakage(store: Store, scope: Scope) -> FigureContent:
     """Net leakage of a cycle over sealed pressure and speed, `cases.seal.states.leakage`."""
     setups, speeds = _leakage_setups(scope), both(scope.some_speeds())
     rows = []
@@ -161,7 +161,9 @@ def leakage(store: Store, scope: Scope) -> Product:
 
     note = " What leaves in a cycle per unit of stroke and area; positive: the seal leaks."
     caption = density_words(scope.mesh(16), 16) + note + " Hollow: not ok."
-    return Product({"leakage": CsvTable(LeakageRow.header(), cells)}, caption, draw, (4.6, 3.2))
+    return FigureContent(
+        {"leakage": CsvTable(LeakageRow.header(), cells)}, caption, draw, (4.6, 3.2)
+    )
 
 
 # --- the shear traction -------------------------------------------------------------------------
@@ -177,7 +179,7 @@ def _shear_setups(scope: Scope) -> list[Seal]:
     return [setup(density, p_s), setup(density, p_s, shear_traction=False)]
 
 
-def shear(store: Store, scope: Scope) -> Product:
+def shear(store: Store, scope: Scope) -> FigureContent:
     """Effect of the shear stress (17) on the deformation of the seal and on h*."""
     with_it, without = _shear_setups(scope)
     rows: list[list[Cell]] = []
@@ -199,7 +201,7 @@ def shear(store: Store, scope: Scope) -> Product:
     )
     p_s = with_it.sealed_pressure
     caption = f"{density_words(scope.mesh(16), 16)} p_s = {p_s:g} MPa, mean rotation held."
-    return Product({"shear": CsvTable(header, rows)}, caption)
+    return FigureContent({"shear": CsvTable(header, rows)}, caption)
 
 
 _ENDS = ("contact_start_mm", "contact_end_mm")
@@ -250,7 +252,7 @@ def _onset_requests(scope: Scope) -> list[Request]:
     ]
 
 
-def onset(store: Store, scope: Scope) -> Product:
+def onset(store: Store, scope: Scope) -> FigureContent:
     """The ripple in h*, a row for each density, p_s and stroke, a column for each |U|."""
     speeds, rows = scope.some_speeds(), []
     for p_s in scope.some_pressures(STUDY_PRESSURES):
@@ -263,7 +265,7 @@ def onset(store: Store, scope: Scope) -> Product:
     caption = (
         "Largest rise of h on the way from the inlet to the dip, in h*; a smooth film has none."
     )
-    return Product({"onset": CsvTable(header, rows)}, caption)
+    return FigureContent({"onset": CsvTable(header, rows)}, caption)
 
 
 ONSET_ITEMS = (Item("onset", "Onset of oscillations", onset, _onset_requests),)
@@ -290,7 +292,7 @@ def _point_requests(scope: Scope) -> list[Request]:
     ]
 
 
-def points(store: Store, scope: Scope) -> Product:
+def points(store: Store, scope: Scope) -> FigureContent:
     """h* over density and number of points, and how far the rules differ."""
     rows, u = [], scope.speed(400.0)
     for d, n in _point_cases(scope):
@@ -303,7 +305,7 @@ def points(store: Store, scope: Scope) -> Product:
         f"h*, FE, m_p = {POINT_ORDER}, outstroke, p_s = {scope.pressure(1.0):g} MPa, "
         f"U = {u:g} mm/s."
     )
-    return Product({"points": CsvTable(header, rows)}, caption)
+    return FigureContent({"points": CsvTable(header, rows)}, caption)
 
 
 POINT_ITEMS = (Item("points", "Number of quadrature points", points, _point_requests),)
@@ -342,7 +344,7 @@ def _arc_requests(scope: Scope) -> list[Request]:
     return [ask(p, speeds) for p in _arc_setups(scope).values()]
 
 
-def arc(store: Store, scope: Scope) -> Product:
+def arc(store: Store, scope: Scope) -> FigureContent:
     """h* over the ends of the arc, by the paper's scheme and the stabilised one."""
     rows: list[list[Cell]] = []
     speeds = both([scope.speed(400.0)])
@@ -358,7 +360,7 @@ def arc(store: Store, scope: Scope) -> Product:
         *("h_star_um", "change_percent", "verdict"),
     )
     note = f" p_s = {scope.pressure(1.0):g} MPa; changes against the first arc."
-    return Product({"arc": CsvTable(header, rows)}, density_words(scope.mesh(16), 16) + note)
+    return FigureContent({"arc": CsvTable(header, rows)}, density_words(scope.mesh(16), 16) + note)
 
 
 # --- the outstroke without cavitation -----------------------------------------------------------
@@ -376,7 +378,7 @@ def _cavitation_requests(scope: Scope) -> list[Request]:
     return [ask(p, speeds) for pair in _cavitation_setups(scope) for p in pair]
 
 
-def cavitation(store: Store, scope: Scope) -> Product:
+def cavitation(store: Store, scope: Scope) -> FigureContent:
     """The outstroke with the penalty (25) and without: least pressure, film and friction."""
     rows: list[list[Cell]] = []
     for pair in _cavitation_setups(scope):
@@ -392,7 +394,7 @@ def cavitation(store: Store, scope: Scope) -> Product:
         *("friction_change_percent", "verdict", "verdict_without"),
     )
     caption = f"{density_words(scope.mesh(16), 16)} Changes: without the penalty against with it."
-    return Product({"cavitation": CsvTable(header, rows)}, caption)
+    return FigureContent({"cavitation": CsvTable(header, rows)}, caption)
 
 
 def _changes(states: list[Any]) -> list[float]:
@@ -419,7 +421,7 @@ def _order_requests(scope: Scope) -> list[Request]:
     return [ask(p, [scope.speed(400.0)]) for p in _order_setups(scope)]
 
 
-def order_cost(store: Store, scope: Scope) -> Product:
+def order_cost(store: Store, scope: Scope) -> FigureContent:
     """Unknowns, iterations and time over the order of the pressure."""
     rows: list[list[Cell]] = []
     for p in _order_setups(scope):
@@ -439,7 +441,7 @@ def order_cost(store: Store, scope: Scope) -> Product:
         "Of the runs of Fig. 16: unknowns, and iterations and seconds from the dry contact to the"
         " film and its shear stress, outstroke; ratios to m_p = 1 on the same mesh."
     )
-    return Product({"order_cost": CsvTable(header, rows)}, caption)
+    return FigureContent({"order_cost": CsvTable(header, rows)}, caption)
 
 
 CHOICE_ITEMS = (

@@ -15,7 +15,7 @@ import numpy as np
 from softehl.cases.paper import blind_predictions, checks, curves, inverse_theory, profiles, tables
 from softehl.cases.paper.checks import observed_order
 from softehl.cases.paper.curves import ORDERS
-from softehl.cases.paper.figure_spec import STUDY_DENSITIES, CsvTable, Item, Product, Scope
+from softehl.cases.paper.figure_spec import STUDY_DENSITIES, CsvTable, FigureContent, Item, Scope
 from softehl.cases.paper.lookup import (
     Finding,
     Measure,
@@ -608,7 +608,7 @@ _SOURCES: Sequence[Item] = (
 
 
 @dataclass(frozen=True)
-class Statement:
+class Claim:
     """A statement: where the paper makes it, what it says, and how it is measured."""
 
     reference: str
@@ -616,14 +616,14 @@ class Statement:
     measure: Callable[[Query], Finding]
 
 
-STATEMENTS = tuple(Statement(reference, text, measure) for reference, text, measure in FINDINGS)
+STATEMENTS = tuple(Claim(reference, text, measure) for reference, text, measure in FINDINGS)
 
 
 def _requests(scope: Scope) -> list[Request]:
     return [request for item in _SOURCES for request in item.requests(scope)]
 
 
-def statements(store: Store, scope: Scope) -> Product:
+def statements(store: Store, scope: Scope) -> FigureContent:
     """Every statement with its measured number."""
     query = Query(store, scope)
     rows = []
@@ -636,7 +636,7 @@ def statements(store: Store, scope: Scope) -> Product:
         rows.append((str(number), statement.reference, statement.text, finding.text, verdict))
     header = ("number", "place", "statement", "measured", "holds")
     caption = "Measured from the runs of the other items."
-    return Product({"statements": CsvTable(header, rows)}, caption)
+    return FigureContent({"statements": CsvTable(header, rows)}, caption)
 
 
 ITEMS = (Item("statements", "The paper's statements", statements, _requests),)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from softehl.cases.paper import drawing
 from softehl.cases.paper.drawing import SeriesLine
 from softehl.cases.paper.figure_spec import (
+    FigureContent,
     Item,
-    Product,
     Scope,
     density_words,
     state_table,
@@ -28,7 +28,7 @@ ORDERS = (1, 2, 3, 4, 5)
 
 
 @dataclass(frozen=True)
-class Series:
+class CurveSeries:
     """A line of a diagram: its label, what it asks for at each abscissa, panel and style."""
 
     label: str
@@ -44,7 +44,7 @@ class Chart:
     """Panels of h* over something."""
 
     titles: Sequence[str]
-    series: Sequence[Series]
+    series: Sequence[CurveSeries]
     abscissa: str
     caption: str
     log_x: bool = False
@@ -57,13 +57,13 @@ def chart_item(name: str, title: str, chart: Callable[[Scope], Chart]) -> Item:
     def requests(scope: Scope) -> list[Request]:
         return [request for s in chart(scope).series for request in s.requests]
 
-    def make(store: Store, scope: Scope) -> Product:
+    def make(store: Store, scope: Scope) -> FigureContent:
         return _product(name, chart(scope), store)
 
     return Item(name, title, make, requests)
 
 
-def _product(name: str, chart: Chart, store: Store) -> Product:
+def _product(name: str, chart: Chart, store: Store) -> FigureContent:
     states_by_series = [
         (s, [store.state(r.setup, u) for r in s.requests for u in r.speeds]) for s in chart.series
     ]
@@ -86,14 +86,14 @@ def _product(name: str, chart: Chart, store: Store) -> Product:
     table = state_table([(s.label, state) for s, some in states_by_series for state in some])
     marks = "" if all(s.plain for s in states) else f" {drawing.marks_words()}"
     caption = chart.caption + marks + verdict_note(states)
-    return Product({name: table}, caption, draw, (3.6 * len(chart.titles) + 1.4, 3.6))
+    return FigureContent({name: table}, caption, draw, (3.6 * len(chart.titles) + 1.4, 3.6))
 
 
 def fig_9(scope: Scope) -> Chart:
     """h* over p_s at several speeds, both strokes."""
     density, pressures = scope.mesh(16), scope.some_pressures(PRESSURES)
     series = [
-        Series(
+        CurveSeries(
             f"U = {sign * u:+g}",
             pressures,
             tuple(ask(setup(density, p), [sign * u]) for p in pressures),
@@ -110,11 +110,11 @@ def fig_9(scope: Scope) -> Chart:
 
 def _over_density(
     scope: Scope, label: str, panel: int, shade: int, style: str = "-", **others: Any
-) -> Series:
+) -> CurveSeries:
     """h* over mesh density of one discretisation, in the state of Fig. 16."""
     densities, u, p_s = _figure_16_state(scope)
     requests = tuple(ask(setup(d, p_s, **others), [u]) for d in densities)
-    return Series(label, tuple(map(float, densities)), requests, panel, shade, style)
+    return CurveSeries(label, tuple(map(float, densities)), requests, panel, shade, style)
 
 
 def _figure_16_state(scope: Scope) -> tuple[tuple[int, ...], float, float]:
@@ -176,7 +176,7 @@ def fig_20(scope: Scope) -> Chart:
     density, u = scope.mesh(16), scope.speed(100.0)
     pressures = scope.some_pressures(FIG_20_PRESSURES)
     series = [
-        Series(
+        CurveSeries(
             f"{stroke}, {law}",
             pressures,
             tuple(ask(setup(density, p, pressure_viscosity=a), [sign * u]) for p in pressures),

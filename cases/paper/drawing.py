@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softehl.cases.paper.figure_spec import Product
+from softehl.cases.paper.figure_spec import FigureContent
 from softehl.cases.paper.states import RequestedState
 from softehl.cases.seal.states.state import Profile
 from softehl.runtime.io import replacing
@@ -39,7 +39,7 @@ _LETTER_WIDTH = 0.049  # inches, of the caption
 _LINE_HEIGHT = 0.15
 
 
-def write_picture(product: Product, path: Path) -> None:
+def write_picture(product: FigureContent, path: Path) -> None:
     """Write the picture with its caption below, if the product has one; atomically."""
     if product.draw is None:
         return

@@ -70,7 +70,7 @@ class CsvTable:
 
 
 @dataclass(frozen=True, eq=False)
-class Product:
+class FigureContent:
     """Tables and picture of an item.
 
     tables: file stem -> table. caption: text below the picture. draw: fills a figure of `size`
@@ -89,7 +89,7 @@ class Item:
 
     name: str
     title: str
-    make: Callable[[Store, Scope], Product]
+    make: Callable[[Store, Scope], FigureContent]
     requests: Callable[[Scope], list[Request]] = field(default=lambda scope: [])
 
 

@@ -17,7 +17,14 @@ from math import nan, sqrt
 
 import numpy as np
 
-from softehl.cases.paper.figure_spec import STUDY_DENSITIES, CsvTable, Item, Product, Scope, both
+from softehl.cases.paper.figure_spec import (
+    STUDY_DENSITIES,
+    CsvTable,
+    FigureContent,
+    Item,
+    Scope,
+    both,
+)
 from softehl.cases.paper.states import Request, RequestedState, Store, ask, setup
 from softehl.cases.seal.gland.records import Oil
 from softehl.runtime.arrays import Array
@@ -56,7 +63,7 @@ def _requests(scope: Scope) -> list[Request]:
     ]
 
 
-def inverse(store: Store, scope: Scope) -> Product:
+def inverse(store: Store, scope: Scope) -> FigureContent:
     """h* beside that of the inverse theory from dry pressure and from the film's own."""
     rows = [
         _row(store, store.state(setup(d, p_s), u))
@@ -69,7 +76,7 @@ def inverse(store: Store, scope: Scope) -> Product:
         *("from_dry_contact_um", "from_film_pressure_um"),
     )
     caption = "h* = sqrt(8 |U| / (9 w)), w the largest |dp/dx| / eta of the inlet."
-    return Product({"inverse": CsvTable(header, rows)}, caption)
+    return FigureContent({"inverse": CsvTable(header, rows)}, caption)
 
 
 def _row(store: Store, state: RequestedState) -> list[Cell]:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper import drawing
 from softehl.cases.paper.figure_spec import (
+    FigureContent,
     Item,
-    Product,
     Scope,
     both,
     density_words,
@@ -83,13 +83,13 @@ def sheet_item(name: str, title: str, sheet: Callable[[Scope], Sheet]) -> Item:
     def requests(scope: Scope) -> list[Request]:
         return [c.request for c in sheet(scope).curves]
 
-    def make(store: Store, scope: Scope) -> Product:
+    def make(store: Store, scope: Scope) -> FigureContent:
         return _product(name, sheet(scope), store)
 
     return Item(name, title, make, requests)
 
 
-def _product(name: str, sheet: Sheet, store: Store) -> Product:
+def _product(name: str, sheet: Sheet, store: Store) -> FigureContent:
     states = {c: store.state(c.request.setup, c.speed) for c in sheet.curves}
     series = [(c.label, state) for c, state in states.items()]
     rows = -(-len(sheet.panels) // sheet.columns)
@@ -104,13 +104,15 @@ def _product(name: str, sheet: Sheet, store: Store) -> Product:
 
     tables = {name: profile_table(series), f"{name}_states": state_table(series)}
     caption = sheet.caption + verdict_note([state for _, state in series])
-    return Product(tables, caption, draw, (3.6 * sheet.columns, 2.9 * rows))
+    return FigureContent(tables, caption, draw, (3.6 * sheet.columns, 2.9 * rows))
 
 
-def _draw_panel(axes: Axes, panel: Panel, shown: dict[ProfileCurve, RequestedState]) -> None:
+def _draw_panel(
+    axes: Axes, panel: Panel, states_of_curves: dict[ProfileCurve, RequestedState]
+) -> None:
     for c, color in zip(panel.curves, drawing.shades(len(panel.curves)), strict=True):
-        drawing.draw_profile(axes, shown[c], panel.value, c.label, color)
-    states = [shown[c] for c in panel.curves]
+        drawing.draw_profile(axes, states_of_curves[c], panel.value, c.label, color)
+    states = [states_of_curves[c] for c in panel.curves]
     axes.set_xlabel(drawing.POSITION)
     axes.set_ylabel(drawing.FILM if panel.value is drawing.film else drawing.PRESSURE)
     drawing.around_contact(axes, states, panel.around)

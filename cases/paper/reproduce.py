@@ -16,7 +16,7 @@ from softehl.cases.harness.case import Run
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.process_pool import processes
 from softehl.cases.harness.resume import Existing
-from softehl.cases.harness.sweep import Curve, Task, shared_folder, solved
+from softehl.cases.harness.sweep import Curve, SweepTask, shared_folder, solved
 from softehl.cases.oring import CASE
 from softehl.cases.paper import (
     blind_predictions,
@@ -46,7 +46,7 @@ def compute(requests: Sequence[Request], store: Store, *, resume: bool, jobs: in
     existing: Existing = "resume" if resume else "overwrite"
     waiting = [r for r in requests if not (resume and is_complete(r, store))]
     tasks = [
-        Task(_run(request, store, resume), store.run_folder(request.setup), existing)
+        SweepTask(_run(request, store, resume), store.run_folder(request.setup), existing)
         for request in waiting
     ]
     with _progress(len(tasks)) as advance, _executor(jobs) as executor:

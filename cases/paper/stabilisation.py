@@ -6,7 +6,7 @@ from math import isnan, nan
 from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper import drawing
-from softehl.cases.paper.figure_spec import CsvTable, Item, Product, Scope, both
+from softehl.cases.paper.figure_spec import CsvTable, FigureContent, Item, Scope, both
 from softehl.cases.paper.states import STABILISED, Request, RequestedState, Store, ask, setup
 from softehl.runtime.io import Cell
 
@@ -37,7 +37,7 @@ def _requests(scope: Scope) -> list[Request]:
     return requests
 
 
-def stabilisation(store: Store, scope: Scope) -> Product:
+def stabilisation(store: Store, scope: Scope) -> FigureContent:
     """h*, oscillation and error of both schemes; profiles and curves beside each other."""
     density, rows = scope.mesh(DENSITY), list[list[Cell]]()
     for p_s in scope.some_pressures(PRESSURES):
@@ -66,7 +66,7 @@ def stabilisation(store: Store, scope: Scope) -> Product:
     def draw(figure: Figure) -> None:
         _draw(figure, store, scope)
 
-    return Product({"stabilisation": CsvTable(header, rows)}, caption, draw, (10.8, 3.1))
+    return FigureContent({"stabilisation": CsvTable(header, rows)}, caption, draw, (10.8, 3.1))
 
 
 def _row(

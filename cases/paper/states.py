@@ -84,12 +84,12 @@ def ask(parameters: Seal, speeds: Iterable[float]) -> Request:
 
 def merged(requests: Iterable[Request]) -> list[Request]:
     """One request for each run folder, the finest meshes first, which take longest."""
-    found: dict[str, Request] = {}
+    by_name: dict[str, Request] = {}
     for request in requests:
-        other = found.get(request.name)
+        other = by_name.get(request.name)
         speeds = request.speeds | (other.speeds if other else frozenset())
-        found[request.name] = Request(request.setup, speeds)
-    return sorted(found.values(), key=lambda r: (-r.setup.density, r.setup.reynolds, r.name))
+        by_name[request.name] = Request(request.setup, speeds)
+    return sorted(by_name.values(), key=lambda r: (-r.setup.density, r.setup.reynolds, r.name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,9 +187,9 @@ class Store:
         seconds = sum(record["seconds"] for record in selected) if selected else nan
         return sum(record["iterations"] for record in selected), seconds
 
-    def _read(self, place: Path) -> list[FilmRow]:
-        if place not in self._rows:
-            folder = CurveFolder(place, FilmRow)
+    def _read(self, path: Path) -> list[FilmRow]:
+        if path not in self._rows:
+            folder = CurveFolder(path, FilmRow)
             folder.load()
-            self._rows[place] = folder.rows
-        return self._rows[place]
+            self._rows[path] = folder.rows
+        return self._rows[path]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softehl.cases.paper.figure_spec import CsvTable, Item, Product, Scope, density_words
+from softehl.cases.paper.figure_spec import CsvTable, FigureContent, Item, Scope, density_words
 from softehl.cases.paper.states import SPEEDS, Request, Store, ask, setup
 from softehl.cases.seal.equations.system import build_system
 from softehl.cases.seal.gland.parameters import Seal
@@ -39,7 +39,7 @@ TABLE_2 = {1: (1076, 109), 2: (3587, 217), 4: (12929, 433), 8: (48893, 865), 16:
 FIG_4_PRESSURES = (0.0, 1.0, 2.0, 5.0)
 
 
-def table_1(_: Store, __: Scope) -> Product:
+def table_1(_: Store, __: Scope) -> FigureContent:
     """Table 1 and the defaults of the case."""
     default = Seal()
     rows: list[tuple[str, ...]] = [
@@ -51,7 +51,7 @@ def table_1(_: Store, __: Scope) -> Product:
     )
     rows.append(("Sealed pressure, p_s", "sealed_pressure", "0 to 5", "0-5", "MPa"))
     header = ("quantity", "key", "softehl", "paper", "unit")
-    return Product({"table1": CsvTable(header, rows)}, "The defaults of the case oring.")
+    return FigureContent({"table1": CsvTable(header, rows)}, "The defaults of the case oring.")
 
 
 def table_2_densities(scope: Scope) -> tuple[int, ...]:
@@ -71,17 +71,17 @@ def unknowns(density: int) -> tuple[int, int]:
     return counted(setup(density, 1.0))
 
 
-def table_2(_: Store, scope: Scope) -> Product:
+def table_2(_: Store, scope: Scope) -> FigureContent:
     """Numbers of unknowns of our meshes beside the paper's."""
     rows = []
     for density in table_2_densities(scope):
         total, film = unknowns(density)
         rows.append((density, total, TABLE_2[density][0], film, TABLE_2[density][1]))
     header = ("density", "unknowns", "unknowns_paper", "pressures", "pressures_paper")
-    return Product({"table2": CsvTable(header, rows)}, "Numbers of unknowns, m_p = 4.")
+    return FigureContent({"table2": CsvTable(header, rows)}, "Numbers of unknowns, m_p = 4.")
 
 
-def fig_3(_: Store, scope: Scope) -> Product:
+def fig_3(_: Store, scope: Scope) -> FigureContent:
     """The undeformed mesh, with the rod and the housing that it will be pressed between."""
     densities = scope.meshes((1, 2), default=2)
     setups = [setup(d, scope.pressure(1.0)) for d in densities]
@@ -106,7 +106,7 @@ def fig_3(_: Store, scope: Scope) -> Product:
 
     note = " Rod (upper line) on the top, sealed side on the left; the ring is not yet squeezed."
     caption = density_words(densities, (1, 2)) + note
-    return Product({"fig3": CsvTable(header, rows)}, caption, draw, (5.6, 2.9))
+    return FigureContent({"fig3": CsvTable(header, rows)}, caption, draw, (5.6, 2.9))
 
 
 def _quads(axes: Axes, corners: Any) -> None:
@@ -129,7 +129,7 @@ def _fig_4_setups(scope: Scope) -> list[Seal]:
     return [setup(density, p_s) for p_s in scope.some_pressures(FIG_4_PRESSURES)]
 
 
-def fig_4(store: Store, scope: Scope) -> Product:
+def fig_4(store: Store, scope: Scope) -> FigureContent:
     """The deformed mesh for rising sealed pressure, drawn from the contact stage."""
     setups = _fig_4_setups(scope)
     rows = []
@@ -158,7 +158,7 @@ def fig_4(store: Store, scope: Scope) -> Product:
         " Rod on the top, sealed side on the left; short lines: the ends of gamma. Drawn from the"
         " frictionless contact stage (the film is thinner than a line)."
     )
-    return Product({"fig4": CsvTable(header, rows)}, caption, draw, (5.6, 4.8))
+    return FigureContent({"fig4": CsvTable(header, rows)}, caption, draw, (5.6, 4.8))
 
 
 def _section(axes: Axes, p: Seal, store: Store) -> None:

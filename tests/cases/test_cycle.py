@@ -16,7 +16,7 @@ import softehl
 from softehl.cases.cycle import CASE, Cycle, cycle_row
 from softehl.cases.seal.cycle import cycle_driver
 from softehl.cases.seal.cycle.cycle_driver import Films
-from softehl.cases.seal.cycle.motion import Motion, RodFilm, TimeTable
+from softehl.cases.seal.cycle.motion import RodFilm, RodMotion, TimeTable
 from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.equations.definition import FILM, PRESSURE, SQUEEZE, VOID
 from softehl.cases.seal.gland.parameters import Seal
@@ -152,11 +152,11 @@ def test_the_frame_does_not_matter() -> None:
 
 
 def test_motions_repeat_and_stop_at_their_corners() -> None:
-    sine = Motion.sine(20.0, 2.0, 1.0)
+    sine = RodMotion.sine(20.0, 2.0, 1.0)
     assert sine.speed.largest == pytest.approx(40.0 * math.pi)
     assert sine.position(0.125) == pytest.approx(10.0, rel=2e-4)
     assert sine.position(5.125) == pytest.approx(sine.position(0.125), abs=1e-9)
-    trapezoid = Motion.trapezoid(20.0, 2.0, 0.1, 1.0)
+    trapezoid = RodMotion.trapezoid(20.0, 2.0, 0.1, 1.0)
     assert trapezoid.position(0.125) == pytest.approx(10.0)
     assert trapezoid.speed.next_corner(0.0) == pytest.approx(0.1)
     assert trapezoid.speed.next_corner(0.1) == pytest.approx(0.15)

@@ -24,7 +24,7 @@ from softehl.cases.seal.gland.rubbers.materials import (
     unstable_at,
 )
 from softehl.cases.seal.gland.rubbers.regions import PRESETS
-from softehl.cases.seal.gland.rubbers.rubber_fit import Fit, fit, read_data
+from softehl.cases.seal.gland.rubbers.rubber_fit import RubberFit, fit, read_data
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.inlet import inlet_length
 from softehl.cases.seal.solve.load_stages import PathDriver
@@ -283,7 +283,7 @@ def test_a_known_rubber_is_found_again(tmp_path: Path, name: str, given: dict[st
     assert wrong.error > 1e-2
 
 
-def treloar(name: str) -> Fit:
+def treloar(name: str) -> RubberFit:
     return fit(name, read_data(TRELOAR))
 
 

@@ -25,16 +25,16 @@ from softehl.cases.seal.sensitivity import design
 from softehl.cases.seal.sensitivity.design import (
     Change,
     DesignStep,
+    DesignTarget,
     HeldFilm,
     Lever,
     NoDesignError,
-    Target,
     bounded,
     designed,
     joint_lever,
     settled,
 )
-from softehl.cases.seal.sensitivity.design import Film as DesignFilm
+from softehl.cases.seal.sensitivity.design import LinearisedFilm as DesignFilm
 from softehl.cases.seal.sensitivity.frozen_mesh_map import FilmCase
 from softehl.cases.seal.sensitivity.moving_mesh import edges, shift_rate, shifted, velocities
 from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, Tangent
@@ -425,7 +425,7 @@ def held(p: Seal) -> Change:
     return lambda factor: factor ** (1.01 * POWER)
 
 
-def steps(target: Target, solve: Callable[[Seal], FilmState | None]) -> list[DesignStep]:
+def steps(target: DesignTarget, solve: Callable[[Seal], FilmState | None]) -> list[DesignStep]:
     def with_mesh(p: Seal) -> DesignFilm | None:
         state = solve(p)
         return DesignFilm.of(state, target.quantity, held(p)) if state else None
@@ -440,7 +440,7 @@ def steps(target: Target, solve: Callable[[Seal], FilmState | None]) -> list[Des
 
 
 def test_a_power_law_is_met_in_one_step() -> None:
-    found = steps(Target.of("friction -3%"), power_law)
+    found = steps(DesignTarget.of("friction -3%"), power_law)
     assert isinstance(found[0], DesignStep)
     assert (found[0].value, found[0].quantity) == (50.0, 5.0)
     assert len(found) == 2
@@ -449,7 +449,7 @@ def test_a_power_law_is_met_in_one_step() -> None:
 
 
 def test_a_wrong_slope_needs_more_steps_and_a_wrong_sign_never_ends() -> None:
-    target = Target.of("friction -6 %")
+    target = DesignTarget.of("friction -6 %")
     found = steps(target, lambda p: power_law(p, 1.5 * POWER))
     assert len(found) > 2
     assert found[-1].quantity == pytest.approx(0.94 * 5.0, rel=1e-4)
@@ -475,31 +475,31 @@ def test_the_last_steps_settle_on_a_mesh_that_is_held() -> None:
 
 def test_what_is_out_of_reach_is_said() -> None:
     with pytest.raises(NoDesignError, match="too little for this target; choose another key"):
-        steps(Target.of("friction -50%"), lambda p: power_law(p, slope=-0.01))
+        steps(DesignTarget.of("friction -50%"), lambda p: power_law(p, slope=-0.01))
     with pytest.raises(NoDesignError, match="has the verdict under-resolved"):
-        steps(Target.of("friction -5%"), lambda p: power_law(p, verdict="under-resolved"))
+        steps(DesignTarget.of("friction -5%"), lambda p: power_law(p, verdict="under-resolved"))
     for wrong in ("friction", "colour -3%", "friction -100%", "friction 3", "friction below 5 mm"):
         with pytest.raises(NoDesignError, match="is not understood"):
-            Target.of(wrong)
+            DesignTarget.of(wrong)
 
 
 TARGETS = {
-    "friction -10%": Target("friction", 0.9),
-    "friction below 5 N": Target("friction", None, 5.0, "below"),
-    "friction <= 0.005 kN": Target("friction", None, 5.0, "below"),
-    "h* above 500 nm": Target("h_star", None, 0.5, "above"),
-    "h_star >= 0.5": Target("h_star", None, 0.5, "above"),
-    "p_max = 20 bar": Target("p_max", None, 2.0, ""),
-    "leakage below 12 mm3/s": Target("leakage", None, 12.0, "below"),
-    "leakage below 1 mm3 a cycle": Target("cycle_leakage", None, 1.0, "below"),
-    "leakage < 0.001 cm\u00b3/cycle": Target("cycle_leakage", None, 1.0, "below"),
-    "cycle_leakage -20%": Target("cycle_leakage", 0.8),
+    "friction -10%": DesignTarget("friction", 0.9),
+    "friction below 5 N": DesignTarget("friction", None, 5.0, "below"),
+    "friction <= 0.005 kN": DesignTarget("friction", None, 5.0, "below"),
+    "h* above 500 nm": DesignTarget("h_star", None, 0.5, "above"),
+    "h_star >= 0.5": DesignTarget("h_star", None, 0.5, "above"),
+    "p_max = 20 bar": DesignTarget("p_max", None, 2.0, ""),
+    "leakage below 12 mm3/s": DesignTarget("leakage", None, 12.0, "below"),
+    "leakage below 1 mm3 a cycle": DesignTarget("cycle_leakage", None, 1.0, "below"),
+    "leakage < 0.001 cm\u00b3/cycle": DesignTarget("cycle_leakage", None, 1.0, "below"),
+    "cycle_leakage -20%": DesignTarget("cycle_leakage", 0.8),
 }
 
 
 def test_targets_are_changes_values_or_bounds() -> None:
     for text, wanted in TARGETS.items():
-        found = Target.of(text)
+        found = DesignTarget.of(text)
         assert (found.quantity, found.factor, found.side) == (
             wanted.quantity,
             wanted.factor,
@@ -510,11 +510,11 @@ def test_targets_are_changes_values_or_bounds() -> None:
 
 def test_a_bound_is_passed_and_not_met_twice() -> None:
     """Friction 5 N: below 6 N nothing changes; 4.8 N is passed by half a per cent in one step."""
-    assert len(steps(Target.of("friction below 6 N"), power_law)) == 1
-    found = steps(Target.of("friction below 4.8 N"), power_law)
+    assert len(steps(DesignTarget.of("friction below 6 N"), power_law)) == 1
+    found = steps(DesignTarget.of("friction below 4.8 N"), power_law)
     assert len(found) == 2
     assert found[-1].quantity == pytest.approx(0.995 * 4.8)
-    assert steps(Target.of("friction = 4.8 N"), power_law)[-1].quantity == pytest.approx(4.8)
+    assert steps(DesignTarget.of("friction = 4.8 N"), power_law)[-1].quantity == pytest.approx(4.8)
 
 
 def test_several_bounds_are_met_by_the_least_change_or_contradict() -> None:
@@ -525,28 +525,28 @@ def test_several_bounds_are_met_by_the_least_change_or_contradict() -> None:
         values = ((5.0 * ratio**POWER, POWER), (2.0 * ratio**2, 2.0))
         return [DesignFilm(state, value, {"rod_diameter": s}) for value, s in values]
 
-    friction = Target.of("friction below 4.8 N")
-    found = bounded(P, [friction, Target.of("h_star below 2.2 um")], 0, BY, films)
+    friction = DesignTarget.of("friction below 4.8 N")
+    found = bounded(P, [friction, DesignTarget.of("h_star below 2.2 um")], 0, BY, films)
     assert len(found) == 2
     assert found[-1].values[0] == pytest.approx(0.995 * 4.8)
     assert found[-1].values[1] < 2.2
-    found = bounded(P, [friction, Target.of("h_star above 2.1 um")], 1, BY, films)
+    found = bounded(P, [friction, DesignTarget.of("h_star above 2.1 um")], 1, BY, films)
     assert found[-1].quantity == pytest.approx(1.005 * 2.1)
     with pytest.raises(
         NoDesignError, match=r"no rod_diameter holds all bounds: .* above 50\.7"
     ) as no:
-        bounded(P, [friction, Target.of("h_star below 2.04 um")], 0, BY, films)
+        bounded(P, [friction, DesignTarget.of("h_star below 2.04 um")], 0, BY, films)
     assert "h_star below 2.04 um needs it below 50.5 mm" in str(no.value)
 
 
 def test_several_targets_are_bounds_of_both_strokes() -> None:
     text = "friction below 5 N and h* above 0.5 um, leakage < 1 mm3/cycle"
-    found = [(t.quantity, t.stroke) for t in Target.several(text, both=True)]
+    found = [(t.quantity, t.stroke) for t in DesignTarget.several(text, both=True)]
     strokes = [(name, stroke) for name in ("friction", "h_star") for stroke in ("out", "in")]
     assert found == [*strokes, ("cycle_leakage", "")]
-    assert len(Target.several(text, both=False)) == 3
+    assert len(DesignTarget.several(text, both=False)) == 3
     with pytest.raises(NoDesignError, match="several targets must be bounds"):
-        Target.several("friction -10% leakage below 1 mm3 a cycle", both=True)
+        DesignTarget.several("friction -10% leakage below 1 mm3 a cycle", both=True)
 
 
 def test_several_keys_change_by_the_least_sum_of_squares() -> None:
@@ -574,7 +574,7 @@ def test_leakage_of_a_cycle_is_a_difference() -> None:
     back = replace(back, sensitivity={"leakage": {"viscosity": 2.0}})
     film = DesignFilm.of_cycle(out, back, 100.0)
     assert film.value == pytest.approx(1.0)
-    assert film.slopes["viscosity"] == pytest.approx(3.0 * 1.0 - 2.0 * 2.0)
+    assert film.log_derivatives["viscosity"] == pytest.approx(3.0 * 1.0 - 2.0 * 2.0)
 
 
 def test_a_key_that_is_no_number_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
@@ -600,7 +600,7 @@ def test_a_measure_of_the_gland_is_designed_by_the_key_that_it_decides(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def found(p: Seal, _target: Target, by: Lever, *_: object) -> list[DesignStep]:
+    def found(p: Seal, _target: DesignTarget, by: Lever, *_: object) -> list[DesignStep]:
         first, last = {"housing_diameter": (56.3, 56.4), "groove_width": (3.74, 4.0)}[by.key]
         return [DesignStep(first, 5.0), DesignStep(last, 4.5)]
 

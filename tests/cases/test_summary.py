@@ -17,7 +17,7 @@ from softehl.cases import cycle, oring
 from softehl.cases.harness.case import Alarm, Run
 from softehl.cases.harness.progress import Display
 from softehl.cases.harness.report.page import parts_of, render, write_xlsx
-from softehl.cases.harness.report.part import FinishedRun, Part, Table
+from softehl.cases.harness.report.part import FinishedRun, Part, ReportTable
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.run_record import RunRecord
 from softehl.cases.harness.runner import RecordingObserver
@@ -195,7 +195,7 @@ def test_tolerances_of_a_cup_are_those_of_its_rod() -> None:
 def test_no_text_of_a_sheet_is_a_formula(tmp_path: Path) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     texts = ("=1+1", "+1+1", "-1+1", "@A1")
-    table = Table("=1+1", texts, [texts, (1.0, 2, nan, "ok")])
+    table = ReportTable("=1+1", texts, [texts, (1.0, 2, nan, "ok")])
     write_xlsx([Part("x", tables=[table])], tmp_path / "a.xlsx")
     book = openpyxl.load_workbook(tmp_path / "a.xlsx")
     cells = [cell for line in book.worksheets[0].iter_rows() for cell in line]

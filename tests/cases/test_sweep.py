@@ -25,8 +25,8 @@ from softehl.cases.harness.case import Run, load_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.observer import Observer
 from softehl.cases.harness.process_pool import completed, processes, solve_side_by_side
-from softehl.cases.harness.study_file import Study, read_study
-from softehl.cases.harness.sweep import Curve, Task, in_order
+from softehl.cases.harness.study_file import StudyFile, read_study
+from softehl.cases.harness.sweep import Curve, SweepTask, in_order
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.tolerances import band
@@ -52,7 +52,7 @@ ratio = [2.2, 3]
 """
 
 
-def study(path: Path, text: str) -> Study:
+def study(path: Path, text: str) -> StudyFile:
     path.write_text(text)
     return read_study(str(path), SHIPPED)
 
@@ -562,5 +562,5 @@ def test_a_sweep_on_dask(serial: list[Curve], tmp_path: Path) -> None:
 
 def test_one_curve_of_each_section_comes_first() -> None:
     cases = [*SWEEP, case(density=2, stroke="in"), case(density=2, mu_1=3.0)]
-    tasks = [Task(Run(CASE, c), Path(str(n)), "refuse") for n, c in enumerate(cases)]
+    tasks = [SweepTask(Run(CASE, c), Path(str(n)), "refuse") for n, c in enumerate(cases)]
     assert [task.folder.name for task in in_order(tasks)] == ["4", "5", "0", "2", "1", "3"]

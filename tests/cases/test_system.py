@@ -18,7 +18,7 @@ from softehl.cases.cycle import Cycle
 from softehl.cases.harness.observer import Outcome
 from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
-from softehl.cases.seal.equations.definition import FILM, PRESSURE, ROD, Block, blocks_of
+from softehl.cases.seal.equations.definition import FILM, PRESSURE, ROD, SealBlock, blocks_of
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.scales import film_flux
 from softehl.cases.seal.equations.system import SealSystem, build_system, seal_study
@@ -185,7 +185,7 @@ def test_a_pressure_is_rounded_to_far_less_than_the_tolerance() -> None:
 
 
 def test_a_kernel_that_asks_for_what_nobody_gives_is_named() -> None:
-    stranger = Block("stranger", "contact", "arc_nodes", (ROD,), "film")
+    stranger = SealBlock("stranger", "contact", "arc_nodes", (ROD,), "film")
     p = oring(density=1)
     with pytest.raises(
         KeyError, match=r"'stranger' asks for offset; cases/seal/equations/definition.py gives"

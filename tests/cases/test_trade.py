@@ -225,7 +225,7 @@ def test_rubbers() -> None:
         found = read_rubber("material", name)
         assert found is not None
         assert (found.polymer, found.shore_A) == (polymer, shore), name
-        assert ("IRHD" in found.said) == ("IRHD" in name)
+        assert ("IRHD" in found.hardness_text) == ("IRHD" in name)
         assert read_rubber("material", found.text) == found
     assert [read_rubber("material", name) for name in DATA["no_names"]] == [None] * len(
         DATA["no_names"]

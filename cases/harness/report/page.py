@@ -14,7 +14,7 @@ from softehl.cases.harness.case import Alarm, AnyCase, find_named_case
 from softehl.cases.harness.curve_folder import CurveFolder
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
-from softehl.cases.harness.report.part import FinishedRun, Part, Table
+from softehl.cases.harness.report.part import FinishedRun, Part, ReportTable
 from softehl.cases.harness.resume import advice_of, disbelief, edited_table
 from softehl.runtime.io import Cell, read_json, replacing, write_text
 
@@ -219,7 +219,7 @@ def input_part(runs: Sequence[FinishedRun], without: Collection[str] = ()) -> Pa
     ]
     header = ("key", *(run.name for run in runs), "unit", "meaning")
     text = "Every key is at its default." if not rows else ""
-    table = Table("Keys that are not at their defaults", header, rows)
+    table = ReportTable("Keys that are not at their defaults", header, rows)
     status = [
         f"{run.name}: {run.content.get('status')} {run.content.get('message') or ''}"
         for run in runs
@@ -251,7 +251,7 @@ def _side_by_side(runs: Sequence[FinishedRun]) -> Part:
             rows.append([at, *values, *changes])
         header = [f"{key.head} [{key.unit}]", *(run.name for run in runs)]
         header += [f"{run.name}, difference in %" for run in others]
-        tables.append(Table(f"{column.title}: {column.meaning}", header, rows))
+        tables.append(ReportTable(f"{column.title}: {column.meaning}", header, rows))
     text = "" if common else "The runs share no row."
     return Part("Side by side", text, tables=tables if common else [])
 
@@ -262,7 +262,9 @@ def _percent(value: float, reference: float) -> float:
 
 def _all_rows(runs: Sequence[FinishedRun]) -> Part:
     tables = [
-        Table(f"{run.name}: every state", run.case.row.titles(), [row.cells() for row in run.rows])
+        ReportTable(
+            f"{run.name}: every state", run.case.row.titles(), [row.cells() for row in run.rows]
+        )
         for run in runs
     ]
     return Part("All columns", tables=tables, folded=True)
@@ -276,7 +278,7 @@ def all_keys(runs: Sequence[FinishedRun]) -> Part:
         for key in keys_of(runs[0].case.parameters)
     ]
     header = ("key", *(run.name for run in runs), "unit", "allowed", "meaning")
-    return Part("All keys", tables=[Table("As used", header, rows)], folded=True)
+    return Part("All keys", tables=[ReportTable("As used", header, rows)], folded=True)
 
 
 def versions(runs: Sequence[FinishedRun]) -> Part:
@@ -285,7 +287,7 @@ def versions(runs: Sequence[FinishedRun]) -> Part:
     names = dict.fromkeys(name for entry in versions_by_run for name in entry)
     rows = [(name, *(str(entry.get(name) or "") for entry in versions_by_run)) for name in names]
     rows.append(("seconds", *(cell_text(run.content.get("seconds")) for run in runs)))
-    table = Table("Versions", ("", *(run.name for run in runs)), rows)
+    table = ReportTable("Versions", ("", *(run.name for run in runs)), rows)
     return Part("Versions", tables=[table], folded=True)
 
 

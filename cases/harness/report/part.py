@@ -14,7 +14,7 @@ _BROAD = 1.6  # width over height of a picture with several panels
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """A table with a caption; numbers are shown with four digits."""
 
     caption: str
@@ -23,7 +23,7 @@ class Table:
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class ReportPicture:
     """A picture (PNG) with a caption."""
 
     caption: str
@@ -45,9 +45,9 @@ class Part:
 
     title: str
     text: str = ""
-    pictures: Sequence[Picture] = ()
+    pictures: Sequence[ReportPicture] = ()
     plots: Sequence[Any] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[ReportTable] = ()
     lines: Sequence[str] = ()
     folded: bool = False
 

@@ -13,7 +13,7 @@ from softehl.cases.harness.case import AnyCase, find_named_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.harness.report.page import capital, input_part, left_out, read_finished
-from softehl.cases.harness.report.part import FinishedRun, Part, Table
+from softehl.cases.harness.report.part import FinishedRun, Part, ReportTable
 from softehl.cases.harness.responses import titled, titled_value
 from softehl.cases.harness.resume import advice_of
 from softehl.runtime.io import Cell, read_json
@@ -22,7 +22,7 @@ _COLUMNS = 12  # of a table at most: random points have a value of their own eac
 
 
 @dataclass(frozen=True)
-class Point:
+class SweepPoint:
     """A run of a sweep: its number, the values of its keys, how it ended, the run, its numbers."""
 
     number: int
@@ -42,7 +42,7 @@ class FinishedSweep:
 
     case: AnyCase
     keys: Mapping[str, str]
-    points: Sequence[Point]
+    points: Sequence[SweepPoint]
     title: str
 
     @property
@@ -50,7 +50,7 @@ class FinishedSweep:
         """The numbers that runs are judged by."""
         return list(dict.fromkeys(name for point in self.points for name in point.merits))
 
-    def values_text(self, point: Point, keys: Sequence[str]) -> str:
+    def values_text(self, point: SweepPoint, keys: Sequence[str]) -> str:
         """The values of some keys of a run in words."""
         return ", ".join(titled_value(_plain(k), point.values[k], self.keys[k]) for k in keys)
 
@@ -105,14 +105,14 @@ def _same(sweep: FinishedSweep) -> Part:
 
 def _point(
     folder: Path, number: int, row: Mapping[str, str], keys: Mapping[str, str], shipped: Any
-) -> Point:
+) -> SweepPoint:
     try:
         run: FinishedRun | None = read_finished(folder / "runs" / f"{number:05d}", shipped)
     except BadInput:  # it is not possible, or did not begin
         run = None
     merits = run.case.merits(run.parameters, run.rows) if run and run.rows else {}
     values = {key: _value(row[key]) for key in keys}
-    return Point(number, values, row["status"], run, merits)
+    return SweepPoint(number, values, row["status"], run, merits)
 
 
 def _plain(key: str) -> str:
@@ -130,7 +130,7 @@ def _value(text: str) -> Cell:
 def _best(sweep: FinishedSweep) -> Part:
     """The runs with the least and the largest number of each kind."""
     rows: list[Sequence[Cell]] = []
-    named = dict[int, Point]()
+    named = dict[int, SweepPoint]()
     for name in sweep.names:
         finite = [p for p in sweep.points if isfinite(p.merit(name))]
         if not finite:
@@ -147,7 +147,7 @@ def _best(sweep: FinishedSweep) -> Part:
             )
         ]
         rows.append((name, *cells))
-    table = Table("Of all runs with a result", ("", "best", "at", "worst", "at"), rows)
+    table = ReportTable("Of all runs with a result", ("", "best", "at", "worst", "at"), rows)
     failed = [p for p in sweep.points if p.status != "converged"]
     lines = [
         f"run {p.number}, {sweep.values_text(p, list(sweep.keys))}: {p.status}" for p in failed
@@ -161,7 +161,7 @@ def _best(sweep: FinishedSweep) -> Part:
     return Part("Best and worst", tables=[table], lines=lines)
 
 
-def _pivot(sweep: FinishedSweep, name: str) -> Table:
+def _pivot(sweep: FinishedSweep, name: str) -> ReportTable:
     """A number over the last key (columns) and all others (rows)."""
     *others, last = sweep.keys
     columns = list(dict.fromkeys(p.values[last] for p in sweep.points))
@@ -172,7 +172,7 @@ def _pivot(sweep: FinishedSweep, name: str) -> Table:
     rows: list[Sequence[Cell]] = [
         (label, *(cells.get(c, nan) for c in columns)) for label, cells in cells_by_row.items()
     ]
-    return Table(name, header, rows)
+    return ReportTable(name, header, rows)
 
 
 def _plot(sweep: FinishedSweep, name: str) -> Any:
@@ -208,5 +208,5 @@ def _every(sweep: FinishedSweep) -> Part:
         (p.number, *p.values.values(), p.status, *(p.merit(name) for name in sweep.names))
         for p in sweep.points
     ]
-    table = Table("Every run", ("run", *heads, "status", *sweep.names), rows)
+    table = ReportTable("Every run", ("run", *heads, "status", *sweep.names), rows)
     return Part("All runs", tables=[table], folded=True)

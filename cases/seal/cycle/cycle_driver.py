@@ -11,7 +11,7 @@ import numpy as np
 
 from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.seal.correctors.schur_corrector import StaleTangent
-from softehl.cases.seal.cycle.motion import Motion
+from softehl.cases.seal.cycle.motion import RodMotion
 from softehl.cases.seal.cycle.transient import (
     Instant,
     March,
@@ -74,7 +74,7 @@ Log = Callable[[int, Films, Reading, Any], Any]
 """A row of the number of a cycle, what happened in it, the reading before it, the last row."""
 
 
-def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) -> Outcome[Any]:
+def run_cycles(parameters: Any, motion: RodMotion, observer: Observer, log: Log) -> Outcome[Any]:
     """All cycles of a case; log: makes a row of each.  Failure is in the outcome's status."""
     speed = motion.speed.at(0.0)
     changes = {"speeds": (speed,), "stroke": "out", "error_estimate": False, "tolerance": None}

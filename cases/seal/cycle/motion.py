@@ -65,7 +65,7 @@ def _repeated(pressure: Rows | float, period: float) -> TimeTable:
 
 
 @dataclass(frozen=True)
-class Motion:
+class RodMotion:
     """A rod that moves at U(t), mm/s, + to the air side, under p_s(t), MPa.
 
     corners: whether U or p_s have corners that a step must not pass.
@@ -76,7 +76,7 @@ class Motion:
     corners: bool = True
 
     @classmethod
-    def sine(cls, stroke: float, frequency: float, pressure: Rows | float) -> Motion:
+    def sine(cls, stroke: float, frequency: float, pressure: Rows | float) -> RodMotion:
         """U = pi f S cos(2 pi f t): the rod starts in the middle of its way, at outstroke.
 
         Straight between 241 times: right to 1e-4 of the largest speed.
@@ -88,7 +88,7 @@ class Motion:
     @classmethod
     def trapezoid(
         cls, stroke: float, frequency: float, ramp: float, pressure: Rows | float
-    ) -> Motion:
+    ) -> RodMotion:
         """Constant speeds with ramps of a share of the period each, from the middle of a way."""
         T = 1.0 / frequency
         U = stroke / (T * 0.5 * (1.0 - ramp))
@@ -97,7 +97,7 @@ class Motion:
         return cls(TimeTable(tuple(T * s for s in fractions), values), _repeated(pressure, T))
 
     @classmethod
-    def of(cls, rows: Rows, pressure: Rows | float) -> Motion:
+    def of(cls, rows: Rows, pressure: Rows | float) -> RodMotion:
         """From rows (time, speed).  ValueError."""
         speed = TimeTable.of(rows)
         return cls(speed, _repeated(pressure, speed.period))

@@ -17,7 +17,7 @@ import numpy as np
 
 from softehl.cases.seal.correctors.layer_split import Layer, Layered
 from softehl.cases.seal.correctors.schur_corrector import SchurCorrector
-from softehl.cases.seal.cycle.motion import Motion, RodFilm, missing
+from softehl.cases.seal.cycle.motion import RodFilm, RodMotion, missing
 from softehl.cases.seal.equations.definition import FILM, PRESSURE, SQUEEZE
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.system import SealSystem
@@ -96,7 +96,7 @@ class March(Stepper):
     """
 
     system: SealSystem
-    motion: Motion
+    motion: RodMotion
     film: FilmLoads
     corrector: SchurCorrector
     layer: Layer

@@ -56,7 +56,7 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Block:
+class SealBlock:
     """Elements of one kernel.
 
     kernel: its name, with words of the case (see `kernel_of`); the solid is that of its region, ""
@@ -139,19 +139,19 @@ def _segment_rule(p: Discretisation) -> Rule:
 
 
 BLOCKS = (
-    Block(SOLID, "{solid}", BODY, (), "solid"),
-    Block("sealed_side", "follower_pressure", "sealed_side", (), "load"),
-    Block("sealed_arc", "follower_pressure", "sealed_arc", (), "load"),
-    Block(ROD, "contact", "arc_nodes", (ROD,), "contact"),
+    SealBlock(SOLID, "{solid}", BODY, (), "solid"),
+    SealBlock("sealed_side", "follower_pressure", "sealed_side", (), "load"),
+    SealBlock("sealed_arc", "follower_pressure", "sealed_arc", (), "load"),
+    SealBlock(ROD, "contact", "arc_nodes", (ROD,), "contact"),
     *(
-        Block(name, kernel, WALLS[name], (name,), "contact", needed=lambda p: not p.rubs)
+        SealBlock(name, kernel, WALLS[name], (name,), "contact", needed=lambda p: not p.rubs)
         for name, kernel in zip(WALLS, ("contact", "contact", "contact{edge}"), strict=True)
     ),
     *(
-        Block(name, FRICTION, on, (name, SHEAR[name]), "contact", needed=lambda p: p.rubs)
+        SealBlock(name, FRICTION, on, (name, SHEAR[name]), "contact", needed=lambda p: p.rubs)
         for name, on in WALLS.items()
     ),
-    Block(
+    SealBlock(
         name=FILM,
         kernel="film{oil}",
         elements="arc",
@@ -160,7 +160,7 @@ BLOCKS = (
         needed=lambda p: not p.conserving,
         rule=_segment_rule,
     ),
-    Block(
+    SealBlock(
         name=FILM,
         kernel="film_{conserving}",
         elements="arc",
@@ -169,7 +169,7 @@ BLOCKS = (
         needed=lambda p: p.conserving,
         rule=lambda p: rupture_rule(p.pressure_order),
     ),
-    Block(
+    SealBlock(
         name="cavitation",
         kernel="film_void",
         elements="film_nodes",
@@ -177,7 +177,7 @@ BLOCKS = (
         group="film",
         needed=lambda p: p.conserving,
     ),
-    Block(
+    SealBlock(
         name=SQUEEZE,
         kernel="film_squeeze{rough}",
         elements="arc",
@@ -186,7 +186,7 @@ BLOCKS = (
         needed=lambda p: p.conserving,
         rule=lambda p: content_rule(p.pressure_order),
     ),
-    Block(
+    SealBlock(
         name="upwind",
         kernel="film_upwind{rough}",
         elements="arc",
@@ -195,7 +195,7 @@ BLOCKS = (
         needed=lambda p: p.upwinding != 0.0,
         rule=_segment_rule,
     ),
-    Block(
+    SealBlock(
         name=FACET,
         kernel="film_facet",
         elements="facets",
@@ -204,12 +204,12 @@ BLOCKS = (
         needed=lambda p: p.reynolds == "dg",
         rule=lambda p: facet_rule(p.pressure_order),
     ),
-    Block("rotation", "mean_rotation", "cells", (ROTATION,), "support", constant=True),
-    Block("hold", "mean_axial", "cells", (AXIAL,), "support", constant=True),
+    SealBlock("rotation", "mean_rotation", "cells", (ROTATION,), "support", constant=True),
+    SealBlock("hold", "mean_axial", "cells", (AXIAL,), "support", constant=True),
 )
 
 
-def blocks_of(p: Seal) -> tuple[Block, ...]:
+def blocks_of(p: Seal) -> tuple[SealBlock, ...]:
     """The blocks of a case, first the solids of its section in the order of their elements."""
     solid, *others = BLOCKS
     region_blocks = [replace(solid, name=f"{SOLID} {r}", elements=r, region=r) for r in p.materials]
@@ -228,7 +228,7 @@ def obstacles_of(p: Gland) -> dict[str, Obstacle]:
     return {obstacle.name: obstacle for obstacle in obstacles}
 
 
-def values_at_rest(block: Block, p: Seal, section: SealSection) -> Values | None:
+def values_at_rest(block: SealBlock, p: Seal, section: SealSection) -> Values | None:
     """Parameters of a block of the unloaded contact problem; None where it is switched off."""
     if block.group == "solid":
         return p.rubber(block.region).rubber_values

@@ -267,10 +267,10 @@ def local_inlet(
 
 def _spaced(length: float, first: float, growth: float) -> Array:
     """Places from 0 to a length, in segments that grow."""
-    places = [0.0]
-    while places[-1] < length:
-        places.append(places[-1] + first + growth * places[-1])
-    return np.array(places) * length / places[-1]
+    nodes = [0.0]
+    while nodes[-1] < length:
+        nodes.append(nodes[-1] + first + growth * nodes[-1])
+    return np.array(nodes) * length / nodes[-1]
 
 
 def _hilbert(X: Array, at: Array) -> Array:

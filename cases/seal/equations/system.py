@@ -26,10 +26,10 @@ from softehl.cases.seal.equations.definition import (
     SHEAR,
     VOID,
     WALLS,
-    Block,
     Field,
     Group,
     Place,
+    SealBlock,
     Values,
     blocks_of,
     contact_values,
@@ -197,7 +197,7 @@ _STEP = 0.9
 with 0.7, 2 % fewer with 0.97; a rough film, which may change by sigma in any case, none."""
 
 
-def seal_study(p: Seal, section: SealSection, blocks: Sequence[Block]) -> Study:
+def seal_study(p: Seal, section: SealSection, blocks: Sequence[SealBlock]) -> Study:
     """The study of a section: nothing moves, nothing presses, no unknown is prescribed.
 
     Raises KeyError for a kernel that asks for a value that nobody gives.
@@ -243,7 +243,7 @@ def _film_places(p: Discretisation, section: SealSection) -> Mapping[str, Intege
 
 
 def _contact_constants(
-    p: Seal, section: SealSection, block: Block, names: Sequence[str]
+    p: Seal, section: SealSection, block: SealBlock, names: Sequence[str]
 ) -> dict[str, Array]:
     """Constants (n,) of contact elements by these names; none of other blocks."""
     if block.group != "contact":
@@ -260,7 +260,7 @@ def _contact_constants(
     return {name: value for name, value in constants.items() if name in names}
 
 
-def kernel_values(block: Block, kernel: ElementKernel, values: Values) -> Values:
+def kernel_values(block: SealBlock, kernel: ElementKernel, values: Values) -> Values:
     """Values that the kernel of a block asks for.  Raises KeyError for one that is not there."""
     missing = [name for name in kernel.parameters if name not in values]
     if missing:
@@ -280,7 +280,7 @@ class SealSystem(SealUnknowns):
     held in it, even if a later stage lets it go.
     """
 
-    blocks: tuple[Block, ...]
+    blocks: tuple[SealBlock, ...]
     obstacles: Mapping[str, Obstacle]
     problem: Problem
 
@@ -306,10 +306,10 @@ class SealSystem(SealUnknowns):
 
     def moved(self, p: Seal, section: SealSection) -> SealSystem:
         """The system of other numbers on the same mesh with its nodes moved."""
-        found = SealSystem.of(p, section)
+        system = SealSystem.of(p, section)
         structure = self.problem.assembler.structure  # what is known of its pattern stays
-        assembler = replace(found.problem.assembler, structure=structure)
-        return replace(found, problem=replace(found.problem, assembler=assembler))
+        assembler = replace(system.problem.assembler, structure=structure)
+        return replace(system, problem=replace(system.problem, assembler=assembler))
 
     # --- blocks -----------------------------------------------------------------------------------
 

@@ -76,10 +76,10 @@ def ring_gland(name: str | None, section: float, kind: Kind, shape: str = "round
     A ring of JIS B 2401 has the groove of that standard, except in pneumatics.
     """
     if name and read_ring(name).outer is None:
-        found = ring(name)
-        section = found.section_diameter  # as it was made: the seal may have swollen
-        if found.groove is not None and kind != "pneumatic" and shape == "round":
-            return found.groove
+        result = ring(name)
+        section = result.section_diameter  # as it was made: the seal may have swollen
+        if result.groove is not None and kind != "pneumatic" and shape == "round":
+            return result.groove
     return gland(section, kind, shape)
 
 
@@ -91,13 +91,13 @@ def ring_for(name: str, inner: float) -> str | None:
     ring_name = read_ring(name)
     if ring_name.outer is not None:
         return None
-    found = ring(name)
+    result = ring(name)
     if ring_name.code is None and ring_name.number is None and ring_name.inch is None:
-        return f"{round(inner):g}x{found.section_diameter:g}" if inner >= 1.0 else None
+        return f"{round(inner):g}x{result.section_diameter:g}" if inner >= 1.0 else None
     letter = ring_name.code[0] if ring_name.code else ""
     names = {code: r for code, r in series().items() if code[0] == letter}
     same = names or {r.name: r for r in as568().values()}
-    close = {n: r for n, r in same.items() if r.section_diameter == found.section_diameter}
+    close = {n: r for n, r in same.items() if r.section_diameter == result.section_diameter}
     best = min(close, key=lambda n: abs(close[n].inner_diameter - inner), default=None)
     if best is None or abs(close[best].inner_diameter / inner - 1.0) > 0.05:
         return None
@@ -139,14 +139,14 @@ def _by_code(text: str, code: str) -> Ring:
     """A ring of a series.  NotUnderstoodError names its neighbours."""
     if code in FRENCH:
         return as568()[FRENCH[code]]
-    found = series()
-    if code in found:
-        return found[code]
+    result = series()
+    if code in result:
+        return result[code]
 
     def away(other: str) -> float:
         return abs(float(other[1:].rstrip("A")) - float(code[1:].rstrip("A")))
 
-    same = sorted((c for c in (*found, *FRENCH) if c[0] == code[0]), key=away)
+    same = sorted((c for c in (*result, *FRENCH) if c[0] == code[0]), key=away)
     standard = STANDARDS.get(code[0], f"series {code[0]}")
     forms = sorted(same[:2], key=lambda c: float(c[1:].rstrip("A")))
     raise refused("ring", text, f"is no size of {standard} that is known here", *forms)
@@ -180,15 +180,15 @@ def _by_number(text: str, ring_name: RingName) -> Ring:
             f'ring = "{text}": AS568 has no general size -{number:03d}; nearest: {neighbours} '
             "(-001 to -050, -102 to -178, -201 to -284, -309 to -395, -425 to -475)"
         )
-    found = rings[number]
-    sizes = found.inner_diameter, found.section_diameter
-    said = ring_name.inner, ring_name.section
-    if ring_name.inner and max(abs(a - b) for a, b in zip(sizes, said, strict=True)) > 0.02:
+    result = rings[number]
+    sizes = result.inner_diameter, result.section_diameter
+    named = ring_name.inner, ring_name.section
+    if ring_name.inner and max(abs(a - b) for a, b in zip(sizes, named, strict=True)) > 0.02:
         raise NotUnderstoodError(
             f'ring = "{text}": size {number:03d} is {sizes[0]:.2f}x{sizes[1]:.2f}, not '
-            f'{said[0]:g}x{said[1]:g}; write "{found.name}" or "{said[0]:g}x{said[1]:g}"'
+            f'{named[0]:g}x{named[1]:g}; write "{result.name}" or "{named[0]:g}x{named[1]:g}"'
         )
-    return _class_b(f"ISO 3601 {number:03d}B", *sizes) if ring_name.iso_class == "B" else found
+    return _class_b(f"ISO 3601 {number:03d}B", *sizes) if ring_name.iso_class == "B" else result
 
 
 NOMINAL = {1 / 16: 0.070, 3 / 32: 0.103, 1 / 8: 0.139, 3 / 16: 0.210, 1 / 4: 0.275}
@@ -210,11 +210,11 @@ def _by_inches(text: str, ring_name: RingName) -> Ring:
                 'as they are, as in "1.484 in x 0.139 in"'
             )
         same = [r for r in as568().values() if abs(r.section_diameter / INCH - true) < 5e-4]
-        found = min(same, key=lambda r: abs(r.inner_diameter / INCH + 0.015 - inner))
-        away = inner - found.inner_diameter / INCH
+        result = min(same, key=lambda r: abs(r.inner_diameter / INCH + 0.015 - inner))
+        away = inner - result.inner_diameter / INCH
         if (32.0 * inner) % 1.0 or not -0.002 <= away <= 0.07:
-            raise refused("ring", text, "is no nominal size of AS568; the nearest is", found.name)
-        return found
+            raise refused("ring", text, "is no nominal size of AS568; the nearest is", result.name)
+        return result
     close = [r for r in as568().values() if abs(r.inner_diameter - INCH * inner) <= 0.13]
     close = [r for r in close if abs(r.section_diameter - INCH * section) <= 0.08]
     if close:

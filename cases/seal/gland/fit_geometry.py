@@ -30,13 +30,13 @@ _GROUND = ("groove_diameter", "squeeze", "groove_depth")
 """Keys that housing_diameter follows from, in the order in which they are read."""
 
 
-def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
+def fitted(specified: Mapping[str, Any]) -> dict[str, Any]:
     """The keys of a case with those that follow from ring, rod, squeeze and gland filled in.
 
     Raises ValueError where something is missing or contradicts; values of wrong types pass, to be
     refused with their keys.
     """
-    values = dict(given)
+    values = dict(specified)
     service = {k: float(values[k]) for k in _SERVICE if number(values.get(k))}
     if service:
         return _in_service(values, **service)

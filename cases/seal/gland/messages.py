@@ -20,7 +20,13 @@ from softehl.cases.seal.gland.rubbers.conditions import (
 )
 from softehl.cases.seal.gland.rubbers.hardness import shore_band, youngs_modulus
 from softehl.cases.seal.gland.sections.section_keys import ROUND, dimensions
-from softehl.cases.seal.gland.trade.oil_names import IMPROVED, POUR, Family, OilName, read_oil_name
+from softehl.cases.seal.gland.trade.oil_names import (
+    IMPROVED,
+    POUR,
+    OilFamily,
+    OilName,
+    read_oil_name,
+)
 from softehl.cases.seal.gland.trade.parse_terms import understood
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.rubber_names import RANGES, read_rubber
@@ -156,7 +162,7 @@ def _unusual(p: Seal) -> Iterator[str]:
         )
 
 
-def _not_resistant(p: Seal, family: Family | None) -> Iterator[str]:
+def _not_resistant(p: Seal, family: OilFamily | None) -> Iterator[str]:
     """A polymer that its oil swells or attacks, and a fluid that is too hot."""
     if family is None:
         if p.polymer in SWOLLEN:
@@ -304,9 +310,9 @@ def _ring(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
 def _hardness(p: Seal) -> Iterator[str]:
     """Another scale than Shore A, and the temperature."""
     rubber = read_rubber("compound", p.compound) if p.compound else None
-    if rubber and rubber.said:
-        chart = " (chart of ASTM D2240)" if "D" in rubber.said.split() else ""
-        yield f"{rubber.said} as {p.shore_A:g} Shore A{chart}"
+    if rubber and rubber.hardness_text:
+        chart = " (chart of ASTM D2240)" if "D" in rubber.hardness_text.split() else ""
+        yield f"{rubber.hardness_text} as {p.shore_A:g} Shore A{chart}"
     if p.temperature is None:
         return
     factor = _stiffer(p, p.glass)
@@ -352,7 +358,7 @@ def _kind(p: Gland) -> tuple[str, bool]:
     return "its standard gland", True
 
 
-def _typical(p: Seal, name: OilName, family: Family, keys_set: frozenset[str]) -> Iterator[str]:
+def _typical(p: Seal, name: OilName, family: OilFamily, keys_set: frozenset[str]) -> Iterator[str]:
     """Values taken from the family of a fluid."""
     texts = []
     if "oil_density" not in keys_set:

@@ -140,12 +140,12 @@ def barus_of_roelands(viscosity: float, z: float) -> float:
     return z * (log(viscosity * 1e6) + 9.67) / 196.2
 
 
-def with_oil(given: Mapping[str, Any]) -> dict[str, Any]:
+def with_oil(specified: Mapping[str, Any]) -> dict[str, Any]:
     """The keys of a case with viscosity and pressure-viscosity coefficient of its oil filled in.
 
     Raises ValueError as `with_rubber`.
     """
-    values = dict(given)
+    values = dict(specified)
     oil, heat, z = (values.get(key) for key in ("oil", "temperature", "roelands"))
     if isinstance(oil, int | float):
         raise ValueError(

@@ -61,7 +61,7 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
     }
     hints: ClassVar = {
         word: f"write {hint}"
-        for hint, words in {
+        for hint, named_keys in {
             'bore = "40 H8"': ("piston", "cylinder", "piston_diameter", "bore_diameter"),
             "sealed_pressure": ("pressure", "p", "p_s"),
             "speeds": ("speed", "velocity", "u"),
@@ -90,13 +90,13 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
             'material = "neo-hooke" and mu': ("shear_modulus", "g"),
             "bulk_modulus, 2 mu (1 + nu) / (3 - 6 nu)": ("nu", "poisson", "poissons_ratio"),
         }.items()
-        for word in words
+        for word in named_keys
     }
 
     @classmethod
-    def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def completed(cls, specified: dict[str, Any]) -> dict[str, Any]:
         """Diameters and width from ring, rod, squeeze and gland; rubber and oil.  ValueError."""
-        values = with_oil(fitted(with_limits(dict(given))))  # an oil may name the temperature
+        values = with_oil(fitted(with_limits(dict(specified))))  # an oil may name the temperature
         return with_rubber(with_regions(values))
 
     @property

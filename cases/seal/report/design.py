@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from softehl.cases.harness.case import AnyCase
 from softehl.cases.harness.report.page import all_keys, input_part, left_out
-from softehl.cases.harness.report.part import FinishedRun, Part, Table
+from softehl.cases.harness.report.part import FinishedRun, Part, ReportTable
 from softehl.cases.harness.report.plot import plot, put_legend_above
 from softehl.cases.harness.responses import titled
 from softehl.cases.seal.report import style
@@ -24,9 +24,9 @@ from softehl.cases.seal.states.state import FilmRow
 
 def design_title(design: Design, run: str) -> str:
     """The seal, the key and the target; run: the title of a run of the seal."""
-    wanted = design.target.wanted.replace(" %", "\N{NO-BREAK SPACE}%")
+    goal = design.target.goal_text.replace(" %", "\N{NO-BREAK SPACE}%")
     keys = " and ".join(lever.title for lever, _, _ in design.moved)
-    return f"{run.partition(': ')[0]}: {keys} for {design.target.title} {wanted}"
+    return f"{run.partition(': ')[0]}: {keys} for {design.target.title} {goal}"
 
 
 def design_parts(design: Design, case: AnyCase) -> list[Part]:
@@ -57,13 +57,13 @@ def _summary(design: Design) -> Part:
         lines=[
             f"{by.title} {after:.5g}{unit} instead of {previous:.5g}{unit}: "
             f"{target.title} {last.quantity:.4g} {target.unit} instead of {first.quantity:.4g} "
-            f"{target.unit}, {design.change:+.2f} % (wanted {target.wanted})",
+            f"{target.unit}, {design.change:+.2f} % (wanted {target.goal_text})",
             *(
                 f"and {lever.title} {later:.5g} {lever.unit} instead of {earlier:.5g} {lever.unit}"
                 for lever, earlier, later in design.moved[1:]
             ),
             *(
-                f"{each.title} {value:.4g} {each.unit} (wanted {each.wanted})"
+                f"{each.title} {value:.4g} {each.unit} (wanted {each.goal_text})"
                 for each, value in zip(design.targets, last.values, strict=False)
                 if each != target
             ),
@@ -112,7 +112,7 @@ def _curve(design: Design) -> Part:
         "Each mark is a nonlinear solve; the line is what the sensitivities of the first one "
         "predict; the full mark meets the target."
     )
-    table = Table("The way to the target", ("solve", key, quantity, "mesh"), rows)
+    table = ReportTable("The way to the target", ("solve", key, quantity, "mesh"), rows)
     panel = plot(key, quantity)
     _draw(panel, design)
     return Part("Design curve", text, plots=[panel], tables=[table])
@@ -144,8 +144,10 @@ def _both(design: Design) -> Part:
         after = value_of(last, name) * ratio ** slope_of(last, name, design.by)
         rows.append((title, previous, after, f"{100.0 * (after / previous - 1.0):+.3g} %", unit))
     if (target := design.target).quantity == CYCLE:
-        before, later = design.steps[0].quantity, design.steps[-1].quantity
-        rows.append((target.title, before, later, f"{design.change:+.3g} %", target.unit))
+        initial, later = design.steps[0].quantity, design.steps[-1].quantity
+        rows.append((target.title, initial, later, f"{design.change:+.3g} %", target.unit))
     header = ("", "before", "after", "change", "unit")
     text = "Also what was not asked for changes; leakage of the stroke is not that of a cycle."
-    return Part("Before and after", text, tables=[Table("Results of this film", header, rows)])
+    return Part(
+        "Before and after", text, tables=[ReportTable("Results of this film", header, rows)]
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite
 
-from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
+from softehl.cases.harness.report.part import FinishedRun, Part, ReportPicture, ReportTable
 from softehl.cases.harness.responses import titled
 from softehl.cases.harness.resume import advice_of
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
@@ -47,7 +47,7 @@ def cycle_parts(runs: Sequence[FinishedRun]) -> list[Part]:
         for row in run.rows
     ]
     text = "A cycle is periodic where it differs from the one before by less than 1 %."
-    tables = [Table("Every cycle", ["run", *heads, "verdict"], rows)]
+    tables = [ReportTable("Every cycle", ["run", *heads, "verdict"], rows)]
     titles = {"friction_loop": "Friction loop", "film_map": "Film over time and place"}
     pictures = (Part(title, pictures=_drawn(runs, name)) for name, title in titles.items())
     return [Part("Cycles", text, tables=tables), *(p for p in pictures if p.pictures), gland(runs)]
@@ -67,7 +67,7 @@ def _compared(runs: Sequence[FinishedRun]) -> list[Part]:
         ("sealed pressure", *(q.sealed_pressure for q in p), "MPa"),
         ("rms height of the seal", *(q.roughness[1] or "smooth" for q in p), "um"),
     ]
-    tables = [Table("Materials", ("", *names, "unit"), rows)]
+    tables = [ReportTable("Materials", ("", *names, "unit"), rows)]
     nets = [{row.speed_mm_s: row for row in net_leakage(run.rows)} for run in runs]
     shared = [speed for speed in nets[0] if all(speed in net for net in nets[1:])]
     if shared:
@@ -76,7 +76,7 @@ def _compared(runs: Sequence[FinishedRun]) -> list[Part]:
             for s in shared
         ]
         caption = "Leakage in a cycle out and back [mm3]; negative: dry on balance"
-        tables.append(Table(caption, ("rod speed |U| [mm/s]", *names), cells))
+        tables.append(ReportTable(caption, ("rod speed |U| [mm/s]", *names), cells))
     return [Part("Materials and leakage side by side", tables=tables)]
 
 
@@ -91,7 +91,7 @@ def gland(runs: Sequence[FinishedRun]) -> Part:
     force = (runs[0].content.get("numbers") or {}).get("air_wall_N")
     if force is not None and len(runs) == 1:
         rows.append(("force on the wall of the air side", -float(force), "N"))
-    table = Table("How the ring sits", ("", *(run.name for run in runs), "unit"), rows)
+    table = ReportTable("How the ring sits", ("", *(run.name for run in runs), "unit"), rows)
     text = "The free section where it slides, and the gland it is pressed into; lengths in mm."
     return Part("Gland and ring", text, pictures=pictures, tables=[table])
 
@@ -152,7 +152,7 @@ def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:
                 for cell, row in zip(cells, rows, strict=True)
             ]
         if rows:
-            tables.append(Table(run.name, head, cells))
+            tables.append(ReportTable(run.name, head, cells))
     text = (
         "Out minus in; negative: the instroke could take back more than there is, dry on balance."
     )
@@ -167,7 +167,9 @@ def _surfaces(runs: Sequence[FinishedRun]) -> list[Part]:
     """Stribeck curves and regimes, of the runs whose surfaces are rough."""
     heads = [c.title for c in FilmRow.columns() if c.name in _SURFACE]
     tables = [
-        Table(run.name, heads, [[getattr(row, name) for name in _SURFACE] for row in run.rows])
+        ReportTable(
+            run.name, heads, [[getattr(row, name) for name in _SURFACE] for row in run.rows]
+        )
         for run in runs
         if any(isfinite(row.lambda_ratio) for row in run.rows)
     ]
@@ -205,13 +207,13 @@ def tolerances(runs: Sequence[FinishedRun]) -> Part:
             )
         if p.oil and read_oil_name(p.oil).grade:
             rows.append((run.name, f"oil = {p.oil}", "viscosity +- 10 % (ISO 3448)"))
-    tables = [Table("Of what was given", ("run", "key", "tolerance"), rows)] if rows else []
+    tables = [ReportTable("Of what was given", ("run", "key", "tolerance"), rows)] if rows else []
     tables += [table for run in runs for table in _bands(run)]
     text = "" if tables else "No key of these runs has a tolerance that is known here."
     return Part("Tolerances", text, pictures_of(runs, FIGURES["tornado"]), tables=tables)
 
 
-def _bands(run: FinishedRun) -> list[Table]:
+def _bands(run: FinishedRun) -> list[ReportTable]:
     """Bands of the results by the tolerances, if the run has sensitivities."""
     rows_read = ToleranceRow.read(run.folder / "tolerances.csv")
     header = ("", "rod speed U [mm/s]", "likely change [%]", "at worst [%]", "most of it by")
@@ -222,10 +224,10 @@ def _bands(run: FinishedRun) -> list[Table]:
         )
         for row in rows_read
     ]
-    return [Table(f"{run.name}: changes that follow", header, rows)] if rows else []
+    return [ReportTable(f"{run.name}: changes that follow", header, rows)] if rows else []
 
 
-def _drawn(runs: Sequence[FinishedRun], name: str) -> list[Picture]:
+def _drawn(runs: Sequence[FinishedRun], name: str) -> list[ReportPicture]:
     """The pictures of this name that the runs have."""
     paths = [(run.name, run.folder / f"{name}.png") for run in runs]
-    return [Picture(title, path.read_bytes()) for title, path in paths if path.exists()]
+    return [ReportPicture(title, path.read_bytes()) for title, path in paths if path.exists()]

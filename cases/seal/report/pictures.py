@@ -18,12 +18,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from softehl.cases.harness.pictures import save
-from softehl.cases.harness.report.part import FinishedRun, Picture
+from softehl.cases.harness.report.part import FinishedRun, ReportPicture
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import Oil
 from softehl.cases.seal.gland.rubbers.materials import MATERIALS, SECOND, nominal_stress, strains
-from softehl.cases.seal.gland.rubbers.rubber_fit import Fit
+from softehl.cases.seal.gland.rubbers.rubber_fit import RubberFit
 from softehl.cases.seal.gland.surfaces import FULL, MIXED
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.profiles import profiles_figure
@@ -247,7 +247,7 @@ def _draw_friction(
     friction.plot(x, forces, color=colour, marker=style.MARKERS[stroke], label=label)
     fractions.plot(x, [row.asperity_load_percent for row in rows], color=colour, label=label)
     fractions.plot(x, [row.boundary_friction_percent for row in rows], "--", color=colour)
-    for ratio, words in _REGIMES.items():
+    for ratio, regime_text in _REGIMES.items():
         position = crossing(p, rows, ratio)
         if position is None:
             continue
@@ -256,7 +256,7 @@ def _draw_friction(
         friction.text(
             x=position,
             y=0.98,
-            s=f"{words} ",
+            s=f"{regime_text} ",
             transform=friction.get_xaxis_transform(),
             rotation=90,
             ha="right" if stroke == "out" else "left",
@@ -269,7 +269,7 @@ def _draw_friction(
 _TEST_COLOURS = dict(zip(SECOND, ("#1b6ca8", "#c8553d", "#4f8a52"), strict=True))
 
 
-def fit_figure(result: Fit) -> Figure:
+def fit_figure(result: RubberFit) -> Figure:
     """Tests as marks, the material that was fitted to them as lines."""
     figure = Figure(figsize=(5.4, 4.0))
     axes = figure.subplots()
@@ -340,11 +340,11 @@ def pictures_of(
     runs: Sequence[FinishedRun],
     draw: Draw,
     caption: Callable[[FinishedRun], str] = lambda run: run.name,
-) -> list[Picture]:
+) -> list[ReportPicture]:
     """Pictures for a page, of the runs that have something to show."""
     with style.drawing():
         figures = [(caption(run), draw(run)) for run in runs]
-        return [Picture(title, _png(figure)) for title, figure in figures if figure]
+        return [ReportPicture(title, _png(figure)) for title, figure in figures if figure]
 
 
 def _png(figure: Figure) -> bytes:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.rubbers.rubber_fit import COLUMNS, Fit, fit, read_data
+from softehl.cases.seal.gland.rubbers.rubber_fit import COLUMNS, RubberFit, fit, read_data
 from softehl.cases.seal.gland.tolerances import ToleranceRow, band, read_tolerances
 from softehl.cases.seal.states.sensitivity_table import SensitivityRow
 from softehl.cases.seal.states.state import FilmRow
@@ -21,7 +21,7 @@ Slopes = Mapping[tuple[float, str], Mapping[str, float]]
 """Rod speed (mm/s) and quantity -> parameter -> log derivative."""
 
 
-def fit_of(p: Seal) -> Fit | None:
+def fit_of(p: Seal) -> RubberFit | None:
     """The fit that a rubber was taken from.  Raises ValueError where it cannot be read."""
     if p.fit is None:
         return None

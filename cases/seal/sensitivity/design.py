@@ -85,7 +85,7 @@ class NoDesignError(BadInput):
 
 
 @dataclass(frozen=True)
-class Target:
+class DesignTarget:
     """Target of a quantity: a factor of its first value, a value, or a bound.
 
     side: "below" or "above" of a bound, else empty. stroke: that it is for, empty where the case
@@ -99,7 +99,7 @@ class Target:
     stroke: Literal["out", "in", ""] = ""
 
     @classmethod
-    def several(cls, text: str, *, both: bool) -> list[Target]:
+    def several(cls, text: str, *, both: bool) -> list[DesignTarget]:
         """From "friction below 5 N and leakage below 1 mm3 a cycle".  Raises NoDesignError.
 
         both: whether a bound holds in both strokes.
@@ -122,15 +122,15 @@ class Target:
         ]
 
     @classmethod
-    def of(cls, text: str) -> Target:
+    def of(cls, text: str) -> DesignTarget:
         """From "friction -10 %" or "friction below 5 N".  Raises NoDesignError."""
         plain = text.strip().replace("h*", "h_star").replace("\u00b3", "3")
         match = _CHANGE.fullmatch(plain)
         if match and match["name"] in TARGETS and float(match["change"]) > -100.0:
             return cls(match["name"], 1.0 + 0.01 * float(match["change"]))
         valued = _VALUE.fullmatch(plain)
-        if valued and (found := cls._of_value(valued)):
-            return found
+        if valued and (target := cls._of_value(valued)):
+            return target
         match = match or valued
         hint = did_you_mean(match["name"], TARGETS) if match else ""
         raise NoDesignError(
@@ -140,7 +140,7 @@ class Target:
         )
 
     @classmethod
-    def _of_value(cls, match: re.Match[str]) -> Target | None:
+    def _of_value(cls, match: re.Match[str]) -> DesignTarget | None:
         """A value or a bound; None for an unknown quantity or unit."""
         name, unit_text = match["name"], (match["unit"] or "").strip()
         per_cycle = _PER_CYCLE.sub("", unit_text)
@@ -188,7 +188,7 @@ class Target:
         return abs(math.log(self.aim(value) / value))
 
     @property
-    def wanted(self) -> str:
+    def goal_text(self) -> str:
         """Change, value or bound in words."""
         if self.factor is not None:
             return f"{round(100.0 * (self.factor - 1.0), 9):+g} %"
@@ -303,8 +303,8 @@ def value_of(state: FilmState, quantity: str) -> float:
 def slope_of(state: FilmState, quantity: str, by: Lever) -> float:
     """Log derivative of a quantity of a film by that of the key of a lever and those with it."""
     assert state.sensitivity is not None
-    slopes = state.sensitivity.get(quantity, {})
-    return sum(share * slopes.get(key, 0.0) for key, share in by.exponents.items())
+    log_derivatives = state.sensitivity.get(quantity, {})
+    return sum(share * log_derivatives.get(key, 0.0) for key, share in by.exponents.items())
 
 
 Change = Callable[[float], float | None]
@@ -312,53 +312,55 @@ Change = Callable[[float], float | None]
 
 
 @dataclass(frozen=True, eq=False)
-class Film:
-    """The film of a case as a design sees it: its quantity, and what that depends on.
+class LinearisedFilm:
+    """Film of a case with the quantity of a design and its sensitivities.
 
-    slopes: key -> log derivative of the quantity. change: on the held mesh. doubt: words where the
-    film has no sensitivities, else empty.
+    log_derivatives: key -> log derivative of the quantity. change: on the held mesh. doubt: reason
+    why the film has no sensitivities, else empty.
     """
 
     state: FilmState
     value: float
-    slopes: Mapping[str, float] = field(default_factory=dict)
+    log_derivatives: Mapping[str, float] = field(default_factory=dict)
     change: Change = lambda _: None
     doubt: str = ""
 
     @classmethod
-    def of(cls, state: FilmState, quantity: str, change: Change) -> Film:
+    def of(cls, state: FilmState, quantity: str, change: Change) -> LinearisedFilm:
         """The film of one stroke."""
         if not differentiable(state) or state.sensitivity is None:
             return cls(state, value_of(state, quantity), doubt=f"has the verdict {state.verdict}")
-        slopes = state.sensitivity.get(quantity, {})
-        return cls(state, value_of(state, quantity), slopes, change)
+        log_derivatives = state.sensitivity.get(quantity, {})
+        return cls(state, value_of(state, quantity), log_derivatives, change)
 
     @classmethod
-    def of_cycle(cls, out: FilmState, back: FilmState, travel: float) -> Film:
+    def of_cycle(cls, out: FilmState, back: FilmState, travel: float) -> LinearisedFilm:
         """Net leakage of a cycle: what the outstroke takes out, less what the instroke takes back.
 
         Its log derivative is that of a difference; the films have no common mesh to be held.
         """
         rates = [abs(s.leak_rate_mm3_s / s.rod_speed_mm_s) * travel for s in (out, back)]
-        net, slopes = rates[0] - rates[1], dict[str, float]()
+        net, log_derivatives = rates[0] - rates[1], dict[str, float]()
         for state, rate in ((out, rates[0]), (back, -rates[1])):
             if not differentiable(state) or state.sensitivity is None:
                 return cls(
                     out, net, doubt=f"has the verdict {state.verdict} ({state.stroke}stroke)"
                 )
             for key, slope in state.sensitivity.get("leakage", {}).items():
-                slopes[key] = slopes.get(key, 0.0) + rate * slope / net
-        return cls(out, net, slopes)
+                log_derivatives[key] = log_derivatives.get(key, 0.0) + rate * slope / net
+        return cls(out, net, log_derivatives)
 
     def slope(self, by: Lever) -> float:
         """Log derivative of the quantity by that of the key of a lever and those with it."""
-        return sum(share * self.slopes.get(key, 0.0) for key, share in by.exponents.items())
+        return sum(
+            share * self.log_derivatives.get(key, 0.0) for key, share in by.exponents.items()
+        )
 
 
-Solve = Callable[[Seal], Film | None]
+Solve = Callable[[Seal], LinearisedFilm | None]
 """The film of a case, None where there is none."""
 
-SolveAll = Callable[[Seal], list[Film] | None]
+SolveAll = Callable[[Seal], list[LinearisedFilm] | None]
 """The film of each target of a case, None where one is not there."""
 
 
@@ -374,7 +376,7 @@ def changed(p: Seal, message: str, **keys: Any) -> Seal:
         raise NoDesignError(f"{message}: {reason}") from None
 
 
-def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[DesignStep]:
+def designed(p: Seal, target: DesignTarget, by: Lever, solve: Solve) -> list[DesignStep]:
     """Steps to the value of the key of a lever that meets a change or a value; the last one does.
 
     Raises NoDesignError.
@@ -393,17 +395,17 @@ def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[DesignSte
         if abs(film.value / goal - 1.0) <= TOLERANCE:
             if target.quantity == CYCLE:  # a difference of two films, each on its own mesh
                 return steps
-            value_near, wanted = by.value_text(changed_case), target.value_text(goal)
-            missed = f"near {value_near} no value gives {wanted} on one mesh"
+            value_near, goal_text = by.value_text(changed_case), target.value_text(goal)
+            missed = f"near {value_near} no value gives {goal_text} on one mesh"
             return [*steps, *settled(steps[-1], goal, slope, film.change, missed)]
     raise NoDesignError(
         f"{target.value_text(steps[-1].quantity)} after {STEPS} solves, wanted was "
-        f"{target.wanted}: ask for a smaller change"
+        f"{target.goal_text}: ask for a smaller change"
     )
 
 
 def bounded(
-    p: Seal, targets: Sequence[Target], main: int, by: Lever, solve: SolveAll
+    p: Seal, targets: Sequence[DesignTarget], main: int, by: Lever, solve: SolveAll
 ) -> list[DesignStep]:
     """Steps to the value of the key of a lever that holds every bound; the last one does.
 
@@ -418,7 +420,7 @@ def bounded(
         steps.append(DesignStep(value, film.value, film.state, film.slope(by), values))
         if all(target.within(v) for target, v in zip(targets, values, strict=True)):
             return steps
-        least, most = (-math.inf, targets[main]), (math.inf, targets[main])
+        lower, upper = (-math.inf, targets[main]), (math.inf, targets[main])
         for target, film in zip(targets, films, strict=True):
             slope, holds = film.slope(by), target.within(film.value)
             if holds and (film.value <= 0.0 or slope == 0.0):
@@ -428,34 +430,40 @@ def bounded(
             else:
                 limit = _log_change(case, target, target.aim(film.value), by, film)
             if (target.side == "below") == (slope > 0.0):
-                most = min(most, (limit, target), key=lambda end: end[0])
+                upper = min(upper, (limit, target), key=lambda end: end[0])
             else:
-                least = max(least, (limit, target), key=lambda end: end[0])
-        if least[0] > most[0]:
-            needs = [_need(p, by, value, *end, above=end is least) for end in (most, least)]
+                lower = max(lower, (limit, target), key=lambda end: end[0])
+        if lower[0] > upper[0]:
+            needs = [_need(p, by, value, *end, above=end is lower) for end in (upper, lower)]
             raise NoDesignError(
                 f"no {by.name} holds all bounds: {' and '.join(needs)} (to first order from "
                 f"{by.value_text(case)}); choose another key or several, or other bounds"
             )
-        value *= math.exp(min(max(0.0, least[0]), most[0]))
+        value *= math.exp(min(max(0.0, lower[0]), upper[0]))
         message = f"the targets need a {p.called(by.key)} that a case cannot have"
         case = changed(p, message, **by.keys_at(p, value))
     texts = [t.value_text(v) for t, v in zip(targets, steps[-1].values, strict=True)]
     raise NoDesignError(
         f"{', '.join(texts)} after {STEPS} solves, wanted was "
-        f"{' and '.join(f'{t.label} {t.wanted}' for t in targets)}: ask for a smaller change"
+        f"{' and '.join(f'{t.label} {t.goal_text}' for t in targets)}: ask for a smaller change"
     )
 
 
-def _need(p: Seal, by: Lever, value: float, limit: float, target: Target, *, above: bool) -> str:
+def _need(
+    p: Seal, by: Lever, value: float, limit: float, target: DesignTarget, *, above: bool
+) -> str:
     """The bound of a lever that a target needs, in words; limit: log change of the key."""
-    ends = [p.model_copy(update=by.keys_at(p, value * math.exp(limit + d))) for d in (0.0, 1e-6)]
-    measure, more = (by.value(end) for end in ends)
+    cases_at_limit = [
+        p.model_copy(update=by.keys_at(p, value * math.exp(limit + d))) for d in (0.0, 1e-6)
+    ]
+    measure, more = (by.value(end) for end in cases_at_limit)
     side = "above" if above == (more > measure) else "below"
-    return f"{target.label} {target.wanted} needs it {side} {measure:.4g} {by.unit}".rstrip()
+    return f"{target.label} {target.goal_text} needs it {side} {measure:.4g} {by.unit}".rstrip()
 
 
-def _log_change(p: Seal, target: Target, goal: float, by: Lever, film: Film) -> float:
+def _log_change(
+    p: Seal, target: DesignTarget, goal: float, by: Lever, film: LinearisedFilm
+) -> float:
     """Log change of the key of a lever to a goal, to first order.  Raises NoDesignError."""
     slope = film.slope(by)
     if film.value <= 0.0:
@@ -473,7 +481,7 @@ def _log_change(p: Seal, target: Target, goal: float, by: Lever, film: Film) -> 
     return log_change / slope
 
 
-def joint_lever(p: Seal, levers: Sequence[Lever], film: Film) -> Lever:
+def joint_lever(p: Seal, levers: Sequence[Lever], film: LinearisedFilm) -> Lever:
     """Several levers as one, by the least sum of squares of the relative changes of their values.
 
     With log quantity = sum S_k x_k to first order, x_k the log change of the value of a lever, that
@@ -481,7 +489,8 @@ def joint_lever(p: Seal, levers: Sequence[Lever], film: Film) -> Lever:
     """
     gears = [lever.gear(p) for lever in levers]
     by_value = [
-        film.slopes.get(lever.key, 0.0) / gear for lever, gear in zip(levers, gears, strict=True)
+        film.log_derivatives.get(lever.key, 0.0) / gear
+        for lever, gear in zip(levers, gears, strict=True)
     ]
     main = max(range(len(levers)), key=lambda n: abs(by_value[n]))
     if by_value[main] == 0.0:
@@ -516,13 +525,13 @@ def settled(
     return steps[1:]
 
 
-def _film(p: Seal, by: Lever, solve: Solve) -> Film:
+def _film(p: Seal, by: Lever, solve: Solve) -> LinearisedFilm:
     film = solve(p)
-    (found,) = _films(p, by, lambda _: None if film is None else [film])
-    return found
+    (result,) = _films(p, by, lambda _: None if film is None else [film])
+    return result
 
 
-def _films(p: Seal, by: Lever, solve: SolveAll) -> list[Film]:
+def _films(p: Seal, by: Lever, solve: SolveAll) -> list[LinearisedFilm]:
     films = solve(p)
     doubt = "did not converge" if films is None else next((f.doubt for f in films if f.doubt), "")
     if films is None or doubt:
@@ -556,10 +565,10 @@ class Design:
     """
 
     parameters: Seal
-    target: Target
+    target: DesignTarget
     by: Lever
     steps: Sequence[DesignStep]
-    targets: Sequence[Target] = ()
+    targets: Sequence[DesignTarget] = ()
 
     @property
     def met(self) -> Seal:
@@ -594,26 +603,26 @@ class Design:
 def design_case(p: Seal, target: str, keys: Sequence[str], observer: Observer) -> Design:
     """The way to a target by keys.  Raises BadInput, also where it is not reached."""
     levers = [_lever(p, key) for key in dict.fromkeys(keys)]
-    behind = [lever.key for lever in levers]
-    if twice := [lever.name for lever in levers if behind.count(lever.key) > 1]:
+    lever_keys = [lever.key for lever in levers]
+    if twice := [lever.name for lever in levers if lever_keys.count(lever.key) > 1]:
         raise BadInput(f"--by {' and '.join(twice)} decide one key; give one of them")
-    targets = Target.several(target, both=p.stroke == "both")
+    targets = DesignTarget.several(target, both=p.stroke == "both")
     p, by = _one_film(p), levers[0]
     films = dict[Seal, HeldFilm | None]()
 
-    def held(q: Seal, stroke: Stroke) -> HeldFilm | None:
+    def held_film(q: Seal, stroke: Stroke) -> HeldFilm | None:
         case = q if q.stroke == stroke else q.model_copy(update={"stroke": stroke})
         if case not in films:
             films[case] = HeldFilm.of(case, observer)
         return films[case]
 
-    def solve(q: Seal) -> list[Film] | None:
-        found = [_film_of(q, each, by, held) for each in targets]
-        return None if None in found else [film for film in found if film]
+    def solve(q: Seal) -> list[LinearisedFilm] | None:
+        results = [_film_of(q, each, by, held_film) for each in targets]
+        return None if None in results else [film for film in results if film]
 
-    def solve_first(q: Seal) -> Film | None:
-        found = solve(q)
-        return found[0] if found else None
+    def solve_first(q: Seal) -> LinearisedFilm | None:
+        results = solve(q)
+        return results[0] if results else None
 
     main = 0
     if targets[0].side or len(levers) > 1:
@@ -640,18 +649,18 @@ def _lever(p: Seal, key: str) -> Lever:
 
 
 def _film_of(
-    q: Seal, target: Target, by: Lever, held: Callable[[Seal, Stroke], HeldFilm | None]
-) -> Film | None:
+    q: Seal, target: DesignTarget, by: Lever, held_film: Callable[[Seal, Stroke], HeldFilm | None]
+) -> LinearisedFilm | None:
     """The film of a target in a case, or for a cycle those of both strokes."""
     if target.quantity == CYCLE:
-        out, back = held(q, "out"), held(q, "in")
-        return Film.of_cycle(out.state, back.state, q.travel) if out and back else None
+        out, back = held_film(q, "out"), held_film(q, "in")
+        return LinearisedFilm.of_cycle(out.state, back.state, q.travel) if out and back else None
     assert q.stroke != "both"
-    film = held(q, target.stroke or q.stroke)
+    film = held_film(q, target.stroke or q.stroke)
     if film is None:
         return None
     change = partial(film.change, target.quantity, by.exponents)
-    return Film.of(film.state, target.quantity, change)
+    return LinearisedFilm.of(film.state, target.quantity, change)
 
 
 def _one_film(p: Seal) -> Seal:
@@ -727,24 +736,24 @@ def design_lines(design: Design) -> list[str]:
         texts = [t.value_text(v) for t, v in zip(targets, quantities_there, strict=True)]
         lines.append(f"  {name} = {value:.8g}{unit}: {', '.join(texts)}")
     if len(steps) == 1:
-        holding = [f"{each.label} is {each.wanted}" for each in targets]
+        holding = [f"{each.label} is {each.goal_text}" for each in targets]
         return [*lines, f"{' and '.join(holding)} already; nothing needs to change"]
     moved = 100.0 * (values[-1] / values[0] - 1.0)
     alone = 100.0 * (steps[1].quantity / first.quantity - 1.0)
     lines.append(
-        f"{target.label} {design.change:+.2f} % (wanted {target.wanted}) by {name} = "
+        f"{target.label} {design.change:+.2f} % (wanted {target.goal_text}) by {name} = "
         f"{values[-1]:.8g}{unit} ({moved:+.3f} %); by the first sensitivity alone: "
         f"{values[1]:.8g}{unit}, which gives {alone:+.2f} %"
     )
     lines += [
-        f"  and {each.value_text(value)} ({each.wanted})"
+        f"  and {each.value_text(value)} ({each.goal_text})"
         for each, value in zip(targets, last.values, strict=False)
         if each != target
     ]
-    for lever, before, after in design.moved[1:]:
+    for lever, initial, after in design.moved[1:]:
         lines.append(
             f"  and {lever.name} = {after:.8g} {lever.unit}".rstrip()
-            + f" ({100.0 * (after / before - 1.0):+.3f} %)"
+            + f" ({100.0 * (after / initial - 1.0):+.3f} %)"
         )
     for lever, _, _ in design.moved:
         if lever.name in BASES:

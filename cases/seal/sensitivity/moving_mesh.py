@@ -16,7 +16,7 @@ import numpy as np
 from softehl.cases.seal.meshing.mesh_morphing import potential
 from softehl.cases.seal.sensitivity.frozen_mesh_map import FilmCase
 from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, rate_of
-from softehl.cases.seal.sensitivity.quantities import Quantity
+from softehl.cases.seal.sensitivity.quantities import SealQuantity
 from softehl.cases.seal.states.mesh_indicators import INLET
 from softehl.runtime.arrays import Array
 
@@ -38,7 +38,7 @@ class FilmEdge:
 
     position: float
     opens: bool
-    moved: Quantity
+    moved: SealQuantity
     thickness: float
 
     def velocities(
@@ -69,7 +69,7 @@ def edges(case: FilmCase, x: Array, h_star: float) -> list[FilmEdge]:
         slope = rise[nodes] / h[nodes]
         by_h = np.zeros(len(h))
         by_h[nodes] = -slope / (slope @ slope) / h[nodes]
-        moved = Quantity(1.0, z=np.zeros(len(h)), h=by_h)
+        moved = SealQuantity(1.0, z=np.zeros(len(h)), h=by_h)
         thickness = float(slope.sum() / (slope @ slope))
         edges_found.append(FilmEdge(float(s[nodes[0]]), not thin[i + 1], moved, thickness))
     return edges_found

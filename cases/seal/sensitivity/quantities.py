@@ -32,7 +32,7 @@ QUANTITIES = tuple(CALLED)
 
 
 @dataclass(frozen=True, eq=False)
-class Quantity:
+class SealQuantity:
     """A quantity and the derivatives of its logarithm.
 
     value: in mm, N, mm^3/s, MPa, mm. fields: block -> field -> weights (elements, points) of its
@@ -48,7 +48,7 @@ class Quantity:
     speed: float = 0.0
 
 
-def quantities(case: FilmCase, x: Array) -> dict[str, Quantity]:
+def quantities(case: FilmCase, x: Array) -> dict[str, SealQuantity]:
     """All quantities of a converged film x (n,)."""
     at = case.problem.fields(FILM, x)
     flux, by_flux = _flux(case, at, x)
@@ -59,10 +59,10 @@ def quantities(case: FilmCase, x: Array) -> dict[str, Quantity]:
     p_max, highest = float(at["p"][top]), np.zeros_like(at["p"])
     highest[top] = 1.0 / p_max
     return {
-        "h_star": Quantity(flux / (0.5 * case.film.rod_speed), by_flux, speed=-1.0),
-        "friction": Quantity(ring * friction, {FILM: shear}, rod=1.0),
-        "leakage": Quantity(ring * flux, by_flux, rod=1.0),
-        "p_max": Quantity(p_max, {FILM: {"p": highest}}),
+        "h_star": SealQuantity(flux / (0.5 * case.film.rod_speed), by_flux, speed=-1.0),
+        "friction": SealQuantity(ring * friction, {FILM: shear}, rod=1.0),
+        "leakage": SealQuantity(ring * flux, by_flux, rod=1.0),
+        "p_max": SealQuantity(p_max, {FILM: {"p": highest}}),
         "contact_width": _width(case, x),
     }
 
@@ -88,7 +88,7 @@ def _flux(
     return q, {FILM: {"flux": by_flux, "dx": by_dx}}
 
 
-def _width(case: FilmCase, x: Array) -> Quantity:
+def _width(case: FilmCase, x: Array) -> SealQuantity:
     """Length of what counts as contact (`contact_level`), piecewise linear between nodes."""
     z, h = case.system.arc_film(x)
     level = contact_level(h)
@@ -111,10 +111,10 @@ def _width(case: FilmCase, x: Array) -> Quantity:
             by_h[h.argmin()] += sign * slope * GROOVE
         end_positions.append(z[at] + t * (z[other] - z[at]))
     width = float(end_positions[1] - end_positions[0])
-    return Quantity(width, z=by_z / width, h=by_h / width)
+    return SealQuantity(width, z=by_z / width, h=by_h / width)
 
 
-def by_unknowns(case: FilmCase, x: Array, q: Quantity) -> Array:
+def by_unknowns(case: FilmCase, x: Array, q: SealQuantity) -> Array:
     """Derivative (n,) of the logarithm of a quantity by the unknowns x (n,)."""
     gradient = np.zeros(len(x))
     for name, weights in q.fields.items():
@@ -131,7 +131,7 @@ Moved = Mapping[str, Mapping[str, Array]]
 
 
 def fields_along(
-    case: FilmCase, x: Array, rate: Inputs, of: Iterable[Quantity]
+    case: FilmCase, x: Array, rate: Inputs, of: Iterable[SealQuantity]
 ) -> dict[str, dict[str, Array]]:
     """Change of the fields of these quantities with a parameter, the unknowns held.
 
@@ -141,7 +141,7 @@ def fields_along(
     return {b: FieldRates(case.problem, b, x).along(rate.blocks[b]) for b in blocks}
 
 
-def along(case: FilmCase, q: Quantity, name: str, rate: Inputs, moved: Moved) -> float:
+def along(case: FilmCase, q: SealQuantity, name: str, rate: Inputs, moved: Moved) -> float:
     """Derivative of the logarithm of a quantity by that of a parameter, the unknowns held.
 
     rate, moved: of the inputs and of the fields that follow from these alone, see `fields_along`.

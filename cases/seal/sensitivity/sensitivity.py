@@ -21,7 +21,7 @@ from softehl.cases.seal.sensitivity.frozen_mesh_map import SPEED, FilmCase
 from softehl.cases.seal.sensitivity.moving_mesh import edges, shift_rate, velocities
 from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, Tangent
 from softehl.cases.seal.sensitivity.quantities import (
-    Quantity,
+    SealQuantity,
     along,
     by_unknowns,
     fields_along,
@@ -88,7 +88,7 @@ def frozen_slopes(
     x: Array,
     linear: LinearSolver,
     rates: Mapping[str, Inputs],
-    of: Mapping[str, Quantity],
+    of: Mapping[str, SealQuantity],
 ) -> Slopes:
     """Derivatives of these quantities of a film x (n,) on a mesh that moves with the section alone.
 
@@ -113,14 +113,14 @@ def differentiation(p: Numerics) -> Differentiate | None:
     """
     if not p.sensitivity:
         return None
-    linear, known, last = direct_solver(p.linear), dict[str, Inputs](), None
+    linear, existing, last = direct_solver(p.linear), dict[str, Inputs](), None
 
     def differentiate(film: Film) -> Mapping[str, Mapping[str, float]] | None:
-        nonlocal known, last
+        nonlocal existing, last
         case = FilmCase(film.system, film.loads)
-        known, last = rates_of(case, known if film.system is last else {}), film.system
+        existing, last = rates_of(case, existing if film.system is last else {}), film.system
         try:
-            return sensitivities(case, film.x, linear, known)
+            return sensitivities(case, film.x, linear, existing)
         except SingularMatrix:
             return None
 

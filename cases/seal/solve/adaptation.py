@@ -169,21 +169,21 @@ class Adaptation:
         except MeshError:
             return None
 
-    def _carried(self, found: Film | NoFilm, system: SealSystem | None) -> Film | NoFilm | None:
+    def _carried(self, result: Film | NoFilm, system: SealSystem | None) -> Film | NoFilm | None:
         """The film on the mesh of a system; None where there is no mesh, or no contact state on it.
 
         It is squeezed out from the contact if none was found, or if the carried one ends. Two of
         three O-rings that take this have no `ok` at -10 mm/s without it (docs/validation).
         """
-        if system is None or found.start_state is None:
+        if system is None or result.start_state is None:
             return None
-        squeeze_film, now = found.start_state
+        squeeze_film, now = result.start_state
         try:
             dry = self.contacts.from_mesh(squeeze_film.system, squeeze_film.dry, system)
         except StageError:
             return None
         solver, film = self.films.on(system), squeeze_film.film
-        if isinstance(found, Film):
+        if isinstance(result, Film):
             transfer = FilmTransfer(squeeze_film.system, system, (squeeze_film.dry, dry[1]))
             start, pressures = replace(now, x=transfer.state(now.x)), transfer.pressures(now.x)
             carried = squeeze_film.carried(system, start.x, dry[1])

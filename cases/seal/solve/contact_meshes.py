@@ -64,8 +64,8 @@ def misplacement(system: SealSystem, x: Array) -> float:
     ratios = [1.0]
     for edge in edges:
         k = int(np.clip(np.searchsorted(positions, edge.position) - 1, 0, len(segments) - 1))
-        wanted = segments.min() * (edge.rise / steepest) ** -0.6
-        ratios.append(float(segments[max(0, k - 1) : k + 2].max() / wanted))
+        required = segments.min() * (edge.rise / steepest) ** -0.6
+        ratios.append(float(segments[max(0, k - 1) : k + 2].max() / required))
     return max(ratios)
 
 

@@ -126,7 +126,7 @@ class FilmSolver:
         last: films at other speeds, the latest last.
         """
         film, correctors = last[-1], last[-1].correctors
-        squeeze_film, before = film.squeeze_film.at(speed), [film.x]
+        squeeze_film, last_film = film.squeeze_film.at(speed), [film.x]
         points = [Point(f.loads.speed**POWER, f.solution) for f in last if f.system is film.system]
         start, stop = points[-1].parameter, speed**POWER
         log = self._log(squeeze_film)
@@ -134,11 +134,11 @@ class FilmSolver:
         def problem_at(t: float) -> NonlinearProblem:
             now = speed if t == stop else t ** (1.0 / POWER)
             loads = replace(squeeze_film.film, speed=now)
-            return replace(squeeze_film, film=loads).steady(before[0])
+            return replace(squeeze_film, film=loads).steady(last_film[0])
 
         def tell(point: Point) -> None:
             log.step(point.solution)
-            before[0] = point.solution.x
+            last_film[0] = point.solution.x
 
         span, minimum = abs(stop - start), _LEAST * max(start, stop)
         usual = 2 * StepRule.target_iterations  # modified ones, two for one of Newton's

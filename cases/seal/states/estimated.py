@@ -85,25 +85,25 @@ class Estimated:
         The contact may be that of `contact_of`: for the pressure that it lacks the pocket of an
         instroke shrinks by its law.
         """
-        found = predicted(system, x, stroke, speed, p.sealed_pressure)
-        if found is None:
+        estimate = predicted(system, x, stroke, speed, p.sealed_pressure)
+        if estimate is None:
             return None
-        h_star, over_pocket = found.h_star, found.over_pocket
+        h_star, over_pocket = estimate.h_star, estimate.over_pocket
         lacking = p.load_ratio(p.sealed_pressure - system.parameters.sealed_pressure)
         if stroke == "in":
             h_star *= np.exp(-0.4 * POCKET * lacking)
             over_pocket *= np.exp(0.4 * POCKET * lacking)
         h_star *= 1.0 + MESH_ERROR * (2.0 / float(system.section.density)) ** 2
-        known = over_pocket <= APPLIES and (stroke == "out" or computed(p, stroke))
-        return cls(float(h_star), float(over_pocket), ERRORS[stroke] if known else ORDER)
+        is_computed = over_pocket <= APPLIES and (stroke == "out" or computed(p, stroke))
+        return cls(float(h_star), float(over_pocket), ERRORS[stroke] if is_computed else ORDER)
 
 
 def estimated_state(
     p: Seal, system: SealSystem, x: Array, stroke: Stroke, speed: float
 ) -> FilmState | None:
     """The state of a case p by the theory, over a dry contact x (n,); None without a theory."""
-    found = Estimated.of(p, system, x, stroke, speed)
-    if found is None:
+    estimate = Estimated.of(p, system, x, stroke, speed)
+    if estimate is None:
         return None
     lacking = p.sealed_pressure - system.parameters.sealed_pressure
     pressure = contact_pressure(system, system.parameters.sealed_pressure, x)
@@ -111,16 +111,16 @@ def estimated_state(
     rod_speed = SIGNS[stroke] * speed
     (touching,) = contacts(system, x)
     z, gap = system.arc_film(x)
-    flux = 0.5 * rod_speed * found.h_star
+    flux = 0.5 * rod_speed * estimate.h_star
     sigma, unknown = p.surfaces.sigma, np.full(len(z), nan)
-    ratio = found.h_star / sigma if sigma else nan
+    ratio = estimate.h_star / sigma if sigma else nan
     return FilmState(
         sealed_pressure_MPa=p.sealed_pressure,
         rod_speed_mm_s=rod_speed,
-        h_star_um=found.h_star / MICROMETRE,
-        h_star_error_percent=found.error,
-        h_star_theory_um=found.h_star / MICROMETRE,
-        inlet_over_pocket=found.over_pocket,
+        h_star_um=estimate.h_star / MICROMETRE,
+        h_star_error_percent=estimate.error,
+        h_star_theory_um=estimate.h_star / MICROMETRE,
+        inlet_over_pocket=estimate.over_pocket,
         h_min_um=nan,
         p_max_MPa=float(pressure.max()),
         pressure_jump_max_MPa=0.0,
@@ -138,10 +138,10 @@ def estimated_state(
         regime=regime(ratio) if sigma else "",
         density=int(system.section.density),
         verdict=ESTIMATED,
-        advice=_advice(p, system, pressure, found),
+        advice=_advice(p, system, pressure, estimate),
         profile=Profile(
             x_mm=z,
-            h_um=(gap - gap.min() + found.h_star) / MICROMETRE,
+            h_um=(gap - gap.min() + estimate.h_star) / MICROMETRE,
             p_MPa=pressure,
             tau_MPa=unknown,
             flux_mm2_s=np.full(len(z), flux),
@@ -151,10 +151,10 @@ def estimated_state(
     )
 
 
-def _advice(p: Seal, system: SealSystem, pressure: Array, found: Estimated) -> str:
+def _advice(p: Seal, system: SealSystem, pressure: Array, estimate: Estimated) -> str:
     """Words on an estimated state."""
-    what = f"h* by the theory of the inlet, known to {found.error:g} %"
-    if found.error >= ORDER:
+    what = f"h* by the theory of the inlet, known to {estimate.error:g} %"
+    if estimate.error >= ORDER:
         what = (
             "h* has the order of magnitude of a smooth film from a pocket of oil that is nearly "
             "closed: take it as boundary lubrication"

@@ -81,10 +81,10 @@ def predicted(
     touching = contacts(system, x) if p.predictable else []
     if len(touching) != 1 or len(touching[0]) <= FEWEST_NODES:
         return None
-    before = 0.0
+    inlet_pressure = 0.0
     if stroke == "out":
-        before = p.sealed_pressure if sealed_pressure is None else sealed_pressure
-    flow = p.viscosity * exp(p.pressure_viscosity * before) * speed
+        inlet_pressure = p.sealed_pressure if sealed_pressure is None else sealed_pressure
+    flow = p.viscosity * exp(p.pressure_viscosity * inlet_pressure) * speed
     surface = _Surface.of(system, x)
     nodes = touching[0] if stroke == "out" else touching[0][::-1]
     edge, length = None, 0.0
@@ -118,7 +118,7 @@ class _Surface:
     """The deformed arc of a dry contact.
 
     s: length along it (nodes,). points: (nodes, 2). p: excess pressure (nodes,). along: stretch
-    (segments,). hoop: stretch (nodes,). ends: least and largest z of the section.
+    (segments,). hoop: stretch (nodes,). z_range: least and largest z of the section.
     """
 
     s: Array
@@ -126,21 +126,23 @@ class _Surface:
     p: Array
     along: Array
     hoop: Array
-    ends: tuple[float, float]
+    z_range: tuple[float, float]
 
     @classmethod
     def of(cls, system: SealSystem, x: Array) -> _Surface:
         """The arc of the contact x (n,)."""
         arc, deformed = system.mesh.arc_nodes, system.deformed(x)
         free, points = system.mesh.points[arc], deformed[arc]
-        before, after = (np.linalg.norm(np.diff(at, axis=0), axis=1) for at in (free, points))
+        undeformed, deformed_lengths = (
+            np.linalg.norm(np.diff(at, axis=0), axis=1) for at in (free, points)
+        )
         return cls(
-            s=np.r_[0.0, np.cumsum(after)],
+            s=np.r_[0.0, np.cumsum(deformed_lengths)],
             points=points,
             p=excess_pressure(system, x),
-            along=after / before,
+            along=deformed_lengths / undeformed,
             hoop=np.abs(points[:, 1] / free[:, 1]),
-            ends=(float(deformed[:, 0].min()), float(deformed[:, 0].max())),
+            z_range=(float(deformed[:, 0].min()), float(deformed[:, 0].max())),
         )
 
     def edge(self, p: Seal, nodes: Integers, length: float) -> Edge | None:
@@ -162,28 +164,28 @@ class _Surface:
         if not rise > 0.0:
             return None
         inwards = 1.0 if nodes[-1] > nodes[0] else -1.0
-        place = self.s[nodes[0]] + inwards * first
-        z = float(np.interp(place, self.s, self.points[:, 0]))
+        s = self.s[nodes[0]] + inwards * first
+        z = float(np.interp(s, self.s, self.points[:, 0]))
         outwards = np.sign(self.points[nodes[0], 0] - self.points[nodes[-1], 0])
-        end = self.ends[1] if outwards > 0.0 else self.ends[0]
+        end = self.z_range[1] if outwards > 0.0 else self.z_range[0]
         return Edge(
             rise=rise,
             curvature=float(0.5 * fit[0] / rise),
-            modulus=self._modulus(p, place, length),
+            modulus=self._modulus(p, s, length),
             pocket=max(abs(end - z), 1e-12),
         )
 
-    def _modulus(self, p: Seal, place: float, length: float) -> float:
+    def _modulus(self, p: Seal, s: float, length: float) -> float:
         """E* at a place of the arc, from the stretches within two lengths of an inlet."""
         middle = 0.5 * (self.s[1:] + self.s[:-1])
-        near = np.abs(middle - place) < max(2.0 * length, 0.01)
-        if not near.any():
-            near = np.arange(len(middle)) == int(np.argmin(np.abs(middle - place)))
+        mask = np.abs(middle - s) < max(2.0 * length, 0.01)
+        if not mask.any():
+            mask = np.arange(len(middle)) == int(np.argmin(np.abs(middle - s)))
         rubber = p.surface_rubber
         material, values = MATERIALS[rubber.material], dict(rubber.rubber_values)
         del values["kappa"]
         return incremental_modulus(
             lambda along, hoop: incremental_stiffness(material, values, along, hoop),
-            float(self.along[near].mean()),
-            float(np.interp(place, self.s, self.hoop)),
+            float(self.along[mask].mean()),
+            float(np.interp(s, self.s, self.hoop)),
         )

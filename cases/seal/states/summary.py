@@ -140,10 +140,10 @@ def _leakage(speed: _Speed, travel: float, service: str | None) -> str:
         return f"{RETURNS} ({both})"
     volume = travel * net.net_mm3_per_mm
     period = 2.0 * travel / net.speed_mm_s
-    words = f"{leaks(volume)} ({both}), {far(volume, travel, service, period)}"
+    text = f"{leaks(volume)} ({both}), {far(volume, travel, service, period)}"
     if net.verdict == ESTIMATED:
-        words += f", within {net.net_error_percent:.2g} %"
-    return words
+        text += f", within {net.net_error_percent:.2g} %"
+    return text
 
 
 def _ratio(strokes: Mapping[str, FilmRow]) -> Iterator[str]:

@@ -29,7 +29,7 @@ RANGE = (0.6, 1.6)
 
 
 @dataclass(frozen=True)
-class Material:
+class RubberMaterial:
     """A material: its keys in a case, and the energy of its kernels."""
 
     energy: str
@@ -40,9 +40,9 @@ class Material:
         """Its kernel of a sheet."""
         return load_kernel(f"sheet_{self.energy}")
 
-    def kernel_values(self, given: Mapping[str, Any]) -> dict[str, float]:
+    def kernel_values(self, parameters: Mapping[str, Any]) -> dict[str, float]:
         """Parameters of its kernels (without the bulk modulus) from the keys of a case."""
-        values = {key: given[key] for key in self.keys}
+        values = {key: parameters[key] for key in self.keys}
         if "ogden_mu" in values:
             return _ogden(values["ogden_mu"], values["ogden_alpha"])
         if self.energy == "mooney_rivlin":
@@ -62,13 +62,13 @@ def _ogden(mu: Sequence[float], alpha: Sequence[float]) -> dict[str, float]:
     }
 
 
-MATERIALS: dict[str, Material] = {
-    "mooney-rivlin": Material("mooney_rivlin", ("mu_1", "mu_2")),
-    "neo-hooke": Material("mooney_rivlin", ("mu",)),
-    "yeoh": Material("yeoh", ("c_10", "c_20", "c_30")),
-    "ogden": Material("ogden", ("ogden_mu", "ogden_alpha")),
-    "arruda-boyce": Material("arruda_boyce", ("mu", "lambda_m")),
-    "gent": Material("gent", ("mu", "J_m")),
+MATERIALS: dict[str, RubberMaterial] = {
+    "mooney-rivlin": RubberMaterial("mooney_rivlin", ("mu_1", "mu_2")),
+    "neo-hooke": RubberMaterial("mooney_rivlin", ("mu",)),
+    "yeoh": RubberMaterial("yeoh", ("c_10", "c_20", "c_30")),
+    "ogden": RubberMaterial("ogden", ("ogden_mu", "ogden_alpha")),
+    "arruda-boyce": RubberMaterial("arruda_boyce", ("mu", "lambda_m")),
+    "gent": RubberMaterial("gent", ("mu", "J_m")),
 }
 """Materials by the names that a case gives them.  A hardness may stand for a single modulus, mu."""
 
@@ -79,9 +79,9 @@ KEYS = tuple(dict.fromkeys(key for m in MATERIALS.values() for key in m.keys))
 """Every key of a material."""
 
 
-def shear_modulus(material: Material, given: Mapping[str, Any]) -> float:
+def shear_modulus(material: RubberMaterial, parameters: Mapping[str, Any]) -> float:
     """Shear modulus without deformation, MPa."""
-    values = material.kernel_values(given)
+    values = material.kernel_values(parameters)
     if material.energy == "mooney_rivlin":
         return values["mu_1"] + values["mu_2"]
     return _modulus(material.energy, tuple(values.items()))
@@ -96,7 +96,7 @@ def _modulus(energy: str, values: tuple[tuple[str, float], ...]) -> float:
 
 
 def incremental_stiffness(
-    material: Material, values: Values, along: float, hoop: float
+    material: RubberMaterial, values: Values, along: float, hoop: float
 ) -> tuple[float, float]:
     """Stress difference of a stretched rubber, and its derivative by the first strain, MPa.
 
@@ -131,13 +131,15 @@ def strains(test: str | Array, stretch: Array) -> Array:
     return np.stack([along, np.vectorize(SECOND.get)(test) * along], axis=1)
 
 
-def nominal_stress(material: Material, values: Values, e: Array, stretch: Array) -> Array:
+def nominal_stress(material: RubberMaterial, values: Values, e: Array, stretch: Array) -> Array:
     """Nominal stress (n,) of an incompressible rubber along the first strain of e (n, 2), MPa."""
     R = material.sheet.residual(np.ones((len(e), 2)), e, parameters=dict(values))
     return np.asarray(R[:, 0] / stretch)
 
 
-def stress_by(material: Material, name: str, values: Values, e: Array, stretch: Array) -> Array:
+def stress_by(
+    material: RubberMaterial, name: str, values: Values, e: Array, stretch: Array
+) -> Array:
     """Derivative (n,) of the nominal stress by a parameter of the kernel."""
     points = np.ones((len(e), 2))
     R = material.sheet.derivative(name, points, e, parameters=dict(values))
@@ -145,7 +147,9 @@ def stress_by(material: Material, name: str, values: Values, e: Array, stretch: 
 
 
 def unstable_at(
-    material: Material, values: Values, limits: Mapping[str, tuple[float, float]] | None = None
+    material: RubberMaterial,
+    values: Values,
+    limits: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[str, float] | None:
     """The test and the stretch nearest to 1 at which Drucker's criterion fails, if one does.
 

@@ -45,10 +45,10 @@ class Region(Rubber):
 
 def with_regions(values: dict[str, Any]) -> dict[str, Any]:
     """The keys of a case with its regions as such.  ValueError, one line, for what is none."""
-    given = values.get("materials", {})
-    if not isinstance(given, Mapping):
+    materials = values.get("materials", {})
+    if not isinstance(materials, Mapping):
         return values
-    tables = dict(given)
+    tables = dict(materials)
     if number(values.get("cap_thickness")):
         tables.setdefault(CAP, "ptfe")
     return {**values, "materials": {name: _region(name, table) for name, table in tables.items()}}

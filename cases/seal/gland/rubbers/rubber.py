@@ -18,7 +18,12 @@ from softehl.cases.seal.gland.rubbers.conditions import (
     swollen_modulus,
 )
 from softehl.cases.seal.gland.rubbers.hardness import shore_range, youngs_modulus
-from softehl.cases.seal.gland.rubbers.materials import KEYS, MATERIALS, Material, shear_modulus
+from softehl.cases.seal.gland.rubbers.materials import (
+    KEYS,
+    MATERIALS,
+    RubberMaterial,
+    shear_modulus,
+)
 from softehl.cases.seal.gland.rubbers.rubber_fit import fit, read_data
 from softehl.cases.seal.gland.trade.normalise_text import refused
 from softehl.cases.seal.gland.trade.rubber_names import GLASS, read_rubber
@@ -27,13 +32,13 @@ PAPER = {"mu_1": 3.04, "mu_2": 0.62}
 """Moduli of Table 1 of the paper, MPa."""
 
 
-def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
+def with_rubber(specified: Mapping[str, Any]) -> dict[str, Any]:
     """The keys of a case with those of its material filled in.
 
     Raises ValueError where something is missing or contradicts; values of wrong types pass, to be
     refused with their keys.
     """
-    values = dict(given)
+    values = dict(specified)
     polymer = _with_hardness(values)
     given_by = {
         k: values[k] for k in ("shore_A", "modulus_table", "fit") if values.get(k) is not None
@@ -91,33 +96,33 @@ def _with_hardness(values: dict[str, Any]) -> str | None:
     return polymer
 
 
-def _require_own(values: dict[str, Any], material: Material) -> None:
+def _require_own(values: dict[str, Any], material: RubberMaterial) -> None:
     """No key of another material; those that have a default elsewhere are emptied."""
     source = f'material = "{values["material"]}"'
     for key in ("shore_A", "modulus_table"):
-        if (given := values.get(key)) is None:
+        if (specified := values.get(key)) is None:
             continue
         if "mu" not in material.keys:
             names = ", ".join(f'"{n}"' for n, m in MATERIALS.items() if "mu" in m.keys)
             one = "a hardness" if key == "shore_A" else "it"
             raise ValueError(
-                f"{key} = {given} and {source} contradict: {one} gives one modulus; "
+                f"{key} = {specified} and {source} contradict: {one} gives one modulus; "
                 f"allowed are {names}"
             )
-        source = f"{key} = {given} ({source})"
+        source = f"{key} = {specified} ({source})"
     for key in KEYS:
         if key in material.keys:
             continue
         if values.get(key) is not None:
-            own = " and ".join(material.keys)
+            own_keys = " and ".join(material.keys)
             raise ValueError(
-                f"{key} = {value_text(values[key])} and {source} contradict: it has {own}; "
+                f"{key} = {value_text(values[key])} and {source} contradict: it has {own_keys}; "
                 "leave one of them out"
             )
         values[key] = None
 
 
-def _with_shore(values: dict[str, Any], material: Material, polymer: str | None) -> None:
+def _with_shore(values: dict[str, Any], material: RubberMaterial, polymer: str | None) -> None:
     """The modulus of a hardness, at the temperature of the seal and as far as it has swollen."""
     mu = youngs_modulus(float(values["shore_A"]), polymer) / 3.0
     heat, rule, swelling = (values.get(k) for k in ("temperature", "modulus_rule", "swelling"))
@@ -139,20 +144,20 @@ def _with_shore(values: dict[str, Any], material: Material, polymer: str | None)
     _put_modulus(values, material, mu, f"shore_A = {values['shore_A']:g}")
 
 
-def _with_table(values: dict[str, Any], material: Material, path: Path) -> None:
+def _with_table(values: dict[str, Any], material: RubberMaterial, path: Path) -> None:
     """The modulus of a table at the temperature of the seal."""
     if not number(heat := values.get("temperature")):
         raise ValueError(f'modulus_table = "{path}" needs the temperature of the seal')
     _put_modulus(values, material, modulus_of_table(path, heat), f'modulus_table = "{path}"')
 
 
-def _put_modulus(values: dict[str, Any], material: Material, mu: float, source: str) -> None:
+def _put_modulus(values: dict[str, Any], material: RubberMaterial, mu: float, source: str) -> None:
     """The key mu of a material by its shear modulus, MPa."""
     if all(number(values.get(key)) for key in material.keys if key != "mu"):
         put(values, "mu", mu / shear_modulus(material, {**values, "mu": 1.0}), source)
 
 
-def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:
+def _with_fit(values: dict[str, Any], material: RubberMaterial, path: Path) -> None:
     name, terms, heat = values["material"], values.get("ogden_terms"), values.get("temperature")
     terms = terms if isinstance(terms, int) and 1 <= terms <= 3 else 3
     result = fit(name, read_data(path), terms, float(heat) if number(heat) else None)
@@ -167,7 +172,7 @@ def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:
         put(values, key, value, f'fit = "{path}"', within=1e-3)
 
 
-def _require_complete(values: dict[str, Any], material: Material) -> None:
+def _require_complete(values: dict[str, Any], material: RubberMaterial) -> None:
     missing = [key for key in material.keys if values.get(key) is None]
     if missing:
         other = ", or shore_A" if missing == ["mu"] else ""

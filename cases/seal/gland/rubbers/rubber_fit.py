@@ -105,7 +105,7 @@ def _number(line: int, row: Mapping[str, str], name: str) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class RubberFit:
     """A material fitted to tests.
 
     values: of its keys, at the temperature that was asked for. model: (n,) its nominal stress at
@@ -130,7 +130,9 @@ class Fit:
         return 1.0 - self.error**2 / float(self.data.stress.var())
 
 
-def fit(name: str, data: RubberData, terms: int = TERMS, temperature: float | None = None) -> Fit:
+def fit(
+    name: str, data: RubberData, terms: int = TERMS, temperature: float | None = None
+) -> RubberFit:
     """The parameters of a material by least squares of the nominal stresses, all points alike.
 
     terms: of Ogden's energy. temperature: at which the moduli are wanted, degC. Raises ValueError
@@ -161,7 +163,7 @@ def fit(name: str, data: RubberData, terms: int = TERMS, temperature: float | No
     tested = {test: data.stretch[data.test == test] for test in set(data.test.tolist())}
     limits = {test: (float(at.min()), float(at.max())) for test, at in tested.items()}
     instability = unstable_at(material, material.kernel_values(parameters), limits)
-    return Fit(name, data, parameters, model, instability)
+    return RubberFit(name, data, parameters, model, instability)
 
 
 def _factor(factors: Mapping[float, float], temperature: float | None) -> float:

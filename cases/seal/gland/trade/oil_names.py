@@ -12,7 +12,7 @@ from softehl.cases.seal.gland.trade.normalise_text import NUMBER, form, plain, r
 
 
 @dataclass(frozen=True)
-class Family:
+class OilFamily:
     """Fluids of ISO 6743-4 and ISO 15380 that are no mineral oils, with values typical of them.
 
     density: at 15 degC, kg/m^3. index: viscosity index, None where at_100 has the viscosity at 100
@@ -39,7 +39,7 @@ def _or_none(text: str) -> float | None:
 
 
 FAMILIES = {
-    row["family"]: Family(
+    row["family"]: OilFamily(
         row["family"],
         row["kind"],
         float(row["density"]),
@@ -89,7 +89,7 @@ class OilName:
     points: tuple[tuple[float, float], ...] = ()
     temperature: float | None = None
     improved: bool = False
-    family: Family | None = None
+    family: OilFamily | None = None
 
 
 _STANDARD = form(r"(?:DIN ?51524(?:-\d)?|ISO ?(?:6743|11158|12922|15380)(?:-\d)?|JIS)[ ,:]*")
@@ -155,12 +155,12 @@ def _of_grade(match: re.Match[str]) -> OilName:
     return OilName(int(match["grade"]), index, temperature=at, improved=improved, family=family)
 
 
-def _family(said: str) -> Family:
+def _family(text: str) -> OilFamily:
     """The fluids that a word of `_FAMILY` means."""
     return next(
         FAMILIES[row["family"]]
         for row in _FAMILY_ROWS
-        if re.fullmatch(f"{row['family']}|{row['also']}", said, re.IGNORECASE)
+        if re.fullmatch(f"{row['family']}|{row['also']}", text, re.IGNORECASE)
     )
 
 

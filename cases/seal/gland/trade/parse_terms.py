@@ -51,13 +51,13 @@ class SaidKeys(Parameters):
     )
 
     @classmethod
-    def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def worded(cls, specified: dict[str, Any]) -> dict[str, Any]:
         """The values without words of the trade, which are kept in `terms`.  ValueError."""
-        values, terms, piston = dict(given), texts(given.get("said")), of_piston(given)
-        for name in given:
+        values, terms, piston = dict(specified), texts(specified.get("said")), of_piston(specified)
+        for name in specified:
             if name in LENGTHS and isinstance(values[name], str):
                 terms += _length(name, values, piston)
-        if "roughness" in given:
+        if "roughness" in specified:
             terms += _finishes(values)
         _oil(values)
         _require_stroke(values.get("stroke"))

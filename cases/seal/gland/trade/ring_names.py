@@ -138,8 +138,8 @@ def read_ring(name: str) -> RingName:
         standard = re.sub(r"[ -]", "", match["name"])
         return _with_standard(name, f"AS568-{match['number']}", standard, _MILITARY_RUBBERS)
     remainder, kind = _without_kind(_STANDARD.sub(" ", text))
-    if found := _by_series(remainder) or _in_inches(remainder, kind):
-        return found
+    if size := _by_series(remainder) or _in_inches(remainder, kind):
+        return size
     if (match := _ISO.fullmatch(remainder)) and not text.startswith("-") and remainder[3:]:
         return RingName(
             number=int(match["number"]),

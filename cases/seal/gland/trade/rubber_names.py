@@ -57,40 +57,41 @@ _PLASTICS = form(r"(?:PTFE|Teflon|POM|PA ?6?|PEEK|UHMW-?PE)\b.*")
 class RubberName:
     """Polymer, None where only the hardness is named, and hardness Shore A.
 
-    said: the hardness on another scale, "70 IRHD" or "50 Shore D", that shore_A follows from.
+    hardness_text: the hardness on another scale, "70 IRHD" or "50 Shore D"; shore_A follows from
+    it.
     """
 
     polymer: str | None
     shore_A: float
-    said: str = ""
+    hardness_text: str = ""
 
     @property
     def text(self) -> str:
         """As it is written here."""
         shore = number_text(self.shore_A)
-        if self.said:
-            return f"{self.polymer} {self.said}" if self.polymer else self.said
+        if self.hardness_text:
+            return f"{self.polymer} {self.hardness_text}" if self.polymer else self.hardness_text
         return f"{self.polymer} {shore}" if self.polymer else f"{shore} Shore A"
 
 
-def read_rubber(key: str, given: str) -> RubberName | None:
+def read_rubber(key: str, value: str) -> RubberName | None:
     """The rubber of a name, None where the text is not like one.  Raises NotUnderstoodError."""
-    text = plain(given)
+    text = plain(value)
     for pattern in _FORMS:
         if match := pattern.fullmatch(text):
-            return _read(key, given, match.groupdict())
+            return _read(key, value, match.groupdict())
     if is_plastic(text):
         why = "is a plastic, no rubber: it may be a cap, cap_thickness and materials.cap"
-        raise refused(key, given, why)
+        raise refused(key, value, why)
     if short := re.fullmatch(r"([NVES]) ?-?(\d\d)", text, re.IGNORECASE):
         name = _SHORT[short[1].upper()]
-        raise refused(key, given, "is a maker's short name", f"{name} {short[2]}")
+        raise refused(key, value, "is a maker's short name", f"{name} {short[2]}")
     if match := re.match(rf"{_POLYMER}[ /-]*(?P<shore>\d\d)\b", text, re.IGNORECASE):
-        shorter = _read(key, given, match.groupdict()).text
-        raise refused(key, given, "says more than polymer and hardness", shorter)
+        shorter = _read(key, value, match.groupdict()).text
+        raise refused(key, value, "says more than polymer and hardness", shorter)
     if shore := re.search(r"(?<!\d)[1-9]\d(?!\d)", text):
         forms = ("NBR 70", "FKM 75", "EPDM 80", "PU 95", f"{shore[0]} Shore A")
-        raise refused(key, given, "names no polymer that is known here", *forms)
+        raise refused(key, value, "names no polymer that is known here", *forms)
     return None
 
 
