@@ -108,13 +108,17 @@ class PointLocator:
         is nearest.
         """
         queries = np.asarray(queries, dtype=np.float64)
-        reach = np.asarray(self._nodes.query(queries)[0])  # no cell is further than the next node
-        pairs, distances = [], []
-        for number, kind in enumerate(self.kinds):
-            point, row = self._candidates(kind, queries, reach)
-            parent, distance = self._feet(kind, row, queries[point])
-            pairs.append((np.full(len(row), number), point, row, parent))
-            distances.append(distance)
+        reach = np.zeros(len(queries))
+        pairs, distances = self._pairs(queries, reach)
+        inside = np.zeros(len(queries), np.bool_)
+        for (_, point, *_), distance in zip(pairs, distances, strict=True):
+            inside[point[distance <= self.tolerance]] = True
+        outside = np.flatnonzero(~inside)
+        if len(outside):  # no cell is further than the next node
+            reach = np.asarray(self._nodes.query(queries[outside])[0])
+            more, further = self._pairs(queries[outside], reach)
+            pairs += [(number, outside[point], *rest) for number, point, *rest in more]
+            distances += further
         kind_of, point, row, parent = (np.concatenate(part) for part in zip(*pairs, strict=True))
         order = np.lexsort((row, kind_of, np.concatenate(distances), point))
         nearest_pairs = order[np.unique(point[order], return_index=True)[1]]
@@ -125,6 +129,16 @@ class PointLocator:
             row[nearest_pairs],
             parent[nearest_pairs],
         )
+
+    def _pairs(self, queries: Array, reach: Array) -> tuple[list[_Pairs], list[Array]]:
+        """Of each kind the places (n, dim) with cells within reach (n,), and their distances."""
+        pairs, distances = [], []
+        for number, kind in enumerate(self.kinds):
+            point, row = self._candidates(kind, queries, reach)
+            parent, distance = self._feet(kind, row, queries[point])
+            pairs.append((np.full(len(row), number), point, row, parent))
+            distances.append(distance)
+        return pairs, distances
 
     def _sorted(self, pairs: list[_Pairs]) -> Located:
         if not pairs:
