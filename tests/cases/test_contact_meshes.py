@@ -22,13 +22,15 @@ from softehl.cases.seal.meshing.spacing import Spacing, Spot, graded
 from softehl.cases.seal.section.layout import Layout, uniform_layout
 from softehl.cases.seal.solve.arc_meshing import contact_layout
 from softehl.cases.seal.solve.contact_meshes import (
+    FIRST_LEG,
     WITHOUT_INFLUENCE,
     ContactMeshes,
     ContactStore,
     contact_key,
+    legs_of,
     stored_contact,
 )
-from softehl.cases.seal.solve.contact_solver import ContactSolver
+from softehl.cases.seal.solve.contact_solver import LEG, ContactSolver
 from softehl.cases.seal.solve.contact_stages import contact_problem
 from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.solve.load_stages import PathDriver
@@ -440,3 +442,30 @@ def test_several_writers_never_show_half_a_state(tmp_path: Path) -> None:
         assert parts is not None
         assert np.ptp(parts["x"]) == 0.0
     assert list(tmp_path.iterdir()) == [path]
+
+
+# --- A path of several legs -----------------------------------------------------------------------
+
+
+def test_legs_end_at_the_sealed_pressure() -> None:
+    p, mu = Seal(), Seal().shear_modulus
+    assert legs_of(p) == [1.0]
+    for ratio, count in ((2.0, 1), (2.2, 2), (3.8, 5), (7.9, 13)):
+        legs = legs_of(p.model_copy(update={"sealed_pressure": ratio * mu}))
+        assert len(legs) == count
+        assert legs[-1] == ratio * mu
+        assert legs[0] <= (FIRST_LEG + 1e-9) * mu
+        assert np.diff(legs) == pytest.approx(LEG * mu)
+    rubbing = p.model_copy(update={"sealed_pressure": 6.0 * mu, "housing_friction": 0.1})
+    assert legs_of(rubbing) == [6.0 * mu]
+
+
+def test_a_path_of_legs_leads_to_the_contact_of_one_path() -> None:
+    p = Seal(density=1, sealed_pressure=2.3 * Seal().shear_modulus)
+    solver = ContactSolver(PathDriver(Silent()))
+    system, x = ContactMeshes(solver).contact(p)
+    assert len(legs_of(p)) == 2
+    kept = [state.pressure for state in solver.checkpoints]
+    assert kept[-1] == pytest.approx(legs_of(p)[0])
+    path = ContactSolver(PathDriver(Silent())).from_rest(system)
+    np.testing.assert_allclose(x, path, rtol=0.0, atol=1e-6)

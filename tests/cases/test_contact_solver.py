@@ -19,7 +19,13 @@ from softehl.cases.seal.meshing.section_mesher import Sizes
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.solve.arc_meshing import contact_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
-from softehl.cases.seal.solve.contact_solver import ContactSolver, CreepCorrector, Creeping, State
+from softehl.cases.seal.solve.contact_solver import (
+    LEG,
+    ContactSolver,
+    CreepCorrector,
+    Creeping,
+    State,
+)
 from softehl.cases.seal.solve.contact_stages import (
     approach_stage,
     at_air_wall,
@@ -54,8 +60,8 @@ def at(share: float) -> Point:
 
 
 def share(solver: ContactSolver) -> float | None:
-    found = solver.checkpoint
-    return found.pressure / LOADED.sealed_pressure if found else None
+    found = solver.checkpoints
+    return found[-1].pressure / LOADED.sealed_pressure if found else None
 
 
 def test_a_path_is_taken_up_again_under_half_of_the_pressure(system: SealSystem) -> None:
@@ -81,11 +87,20 @@ def test_a_new_path_replaces_the_last_one(system: SealSystem) -> None:
     )
     for pressure in (0.2, 0.4, 0.9):
         solver.keep(system, at(pressure))
-    assert solver.checkpoint is not None
-    assert solver.checkpoint.system is system
+    assert solver.checkpoints[-1].system is system
     solver.keep(finer, at(0.4))
-    assert solver.checkpoint.system is finer
+    assert solver.checkpoints[-1].system is finer
     assert share(solver) == pytest.approx(0.4)
+
+
+def test_a_path_that_is_taken_up_keeps_a_state_of_each_leg(system: SealSystem) -> None:
+    solver, leg = ContactSolver(PathDriver(Silent())), LEG * LOADED.shear_modulus
+    solver.keep(system, at(0.4))
+    begin = 0.5 * LOADED.sealed_pressure
+    for pressure in (begin, begin + 0.5 * leg, begin + leg, begin + 1.3 * leg, 0.99 * 10.0):
+        solver.keep(system, at(pressure / LOADED.sealed_pressure), begin)
+    kept = [state.pressure for state in solver.checkpoints]
+    assert kept == pytest.approx([4.0, begin, begin + leg])
 
 
 def test_a_path_from_rest_leaves_its_own_state(system: SealSystem) -> None:
@@ -93,9 +108,8 @@ def test_a_path_from_rest_leaves_its_own_state(system: SealSystem) -> None:
     solver = ContactSolver(PathDriver(Silent()))
     solver.keep(system, at(0.5))
     solver.from_rest(light)
-    assert solver.checkpoint is not None
-    assert solver.checkpoint.system is light
-    assert 0.0 < solver.checkpoint.pressure <= 0.5
+    assert solver.checkpoints[-1].system is light
+    assert 0.0 < solver.checkpoints[-1].pressure <= 0.5
 
 
 def test_contact_above_three_shear_moduli_is_not_walked_from_rest_on_every_mesh() -> None:

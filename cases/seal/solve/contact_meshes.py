@@ -17,6 +17,7 @@ import json
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records import Numerics, Oil
 from softehl.cases.seal.gland.surfaces import Surfaces
 from softehl.cases.seal.solve.arc_meshing import CYCLES, DENSITY, contact_layout, on_wall
-from softehl.cases.seal.solve.contact_solver import ContactSolver, State
+from softehl.cases.seal.solve.contact_solver import LEG, ContactSolver, State
 from softehl.cases.seal.solve.contact_stages import contact_problem, correction_stage
 from softehl.cases.seal.solve.load_stages import Stage, StageError
 from softehl.cases.seal.states.contacts import contact_edges, unsealed
@@ -48,9 +49,28 @@ COARSE = 1
 """Density of the mesh on which the path from rest is followed."""
 
 
-HIGH, MISPLACED = 5.0, 2.5
-"""p_s / mu from which on, and misplacement above which a mesh is made again: at 6.5 one more mesh
-took it from 6.3 to 1.5, and an outstroke without a film then had one."""
+MISPLACED = 2.5
+"""Misplacement above which a mesh is made again, after a path of several legs: at p_s / mu = 6.5
+one more mesh took it from 6.3 to 1.5, and an outstroke without a film then had one."""
+
+
+FIRST_LEG = 2.0
+"""Largest end of the first leg of the pressure, over the shear modulus. A first leg to 2.4 on the
+coarse mesh could not be carried to a graded one, and its path was followed again from rest; from
+1.9 it could."""
+
+
+def legs_of(p: Seal) -> list[float]:
+    """Pressures (MPa) at which a path to the contact of a case gets a new mesh; the last is p_s.
+
+    With friction one leg: what slips remembers its path.
+    """
+    end = p.load_ratio(p.sealed_pressure)
+    if p.rubs or end <= FIRST_LEG:
+        return [p.sealed_pressure]
+    count = ceil((end - FIRST_LEG) / LEG - 1e-9)
+    ratios = [end - LEG * k for k in range(count, 0, -1)]
+    return [*(ratio / end * p.sealed_pressure for ratio in ratios), p.sealed_pressure]
 
 
 def misplacement(system: SealSystem, x: Array) -> float:
@@ -155,9 +175,13 @@ class ContactMeshes:
         # what sticks keeps the rotation of the mesh on which it began to
         guide = min(DENSITY, p.density)
         coarse = guide if p.rubs else COARSE
-        uniform = build_system(_at(p.model_copy(update={"mesh": "uniform"}), coarse))
-        seen = self._next((uniform, self._first_state(uniform)), _at(p, coarse))
-        return self._sealed(p, self._finer(*self._next(seen, _at(p, guide)), p.density))
+        first, *legs = (p.model_copy(update={"sealed_pressure": end}) for end in legs_of(p))
+        uniform = build_system(_at(first.model_copy(update={"mesh": "uniform"}), coarse))
+        seen = self._next((uniform, self._first_state(uniform)), _at(first, coarse))
+        state = self._next(seen, _at(first, guide))
+        for leg in legs:
+            state = self._leg(state, _at(leg, guide))
+        return self._sealed(p, self._finer(*state, p.density))
 
     def _sealed(self, p: Seal, state: State) -> State:
         """On a mesh whose arc and whose sealed pressure end well, of a few that are made for it."""
@@ -166,7 +190,7 @@ class ContactMeshes:
             if p.given_arc or not (unsealed(system, x) or on_wall(system, x)):
                 break
             state = self._next(state, p)
-        return self._placed(p, state) if p.load_ratio(p.sealed_pressure) > HIGH else state
+        return self._placed(p, state) if len(legs_of(p)) > 1 else state
 
     def _placed(self, p: Seal, state: State) -> State:
         """On a mesh whose fine segments lie at the edges of the contact, of a few made for it."""
@@ -178,6 +202,11 @@ class ContactMeshes:
             except StageError:  # a coarse edge is judged by its films
                 break
         return state
+
+    def _leg(self, state: State, p: Seal) -> State:
+        """Under the pressure of p, on a mesh that is made for the contact under a lower one."""
+        old, x = state
+        return self.solver.leg(old, x, build_system(p, contact_layout(old, x, p)))
 
     def _next(self, state: State, p: Seal) -> State:
         """On a mesh that is made for the contact on another one."""

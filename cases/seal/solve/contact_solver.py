@@ -18,7 +18,7 @@ section diameter d. A short tau makes the next state unique; a long one leaves t
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeAlias
 
@@ -26,7 +26,7 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 
 from softehl.cases.seal.correctors.proximal_term import Anchored
-from softehl.cases.seal.equations.system import SealSystem
+from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.solve.contact_stages import (
     approach_stage,
     at_air_wall,
@@ -112,6 +112,10 @@ class CreepCorrector:
 
 State: TypeAlias = tuple[SealSystem, Array]
 
+LEG = 0.5
+"""Length of a leg of the pressure, in shear moduli: a contact at 5.4 was carried from mesh to mesh
+in all legs but one of 0.5, its pocket shrinks by a quarter in each."""
+
 _SHARE = 0.5
 """Of the sealed pressure; going back to rest at once takes 1.4 times the work."""
 
@@ -129,12 +133,12 @@ class Checkpoint:
 class ContactSolver:
     """Finds contact states.
 
-    driver: follows their paths. checkpoint: where the last path may be taken up again, under at
-    most half of the sealed pressure, None where there is nothing but rest; it changes with a path.
+    driver: follows their paths. checkpoints: where the last path may be taken up again, the one
+    under the highest pressure last; none where there is nothing but rest. They change with a path.
     """
 
     driver: PathDriver
-    checkpoint: Checkpoint | None = None
+    checkpoints: list[Checkpoint] = field(default_factory=list)
 
     def from_rest(self, system: SealSystem) -> Array:
         """The contact state (n,) by its path: rod approach, then the sealed pressure.
@@ -155,14 +159,27 @@ class ContactSolver:
 
         Raises StageError.
         """
-        p_s, previous = new.parameters.sealed_pressure, self.checkpoint
+        p_s = new.parameters.sealed_pressure
         with suppress(StageError):
             return new, self._corrected(Checkpoint(old, p_s, x), new, name)
-        if previous:
+        for previous in reversed(self.checkpoints):
             with suppress(StageError):
-                start = self._corrected(previous, new, f"contact at {previous.pressure:.4g} MPa")
+                start = self._corrected(previous, new, _at(previous.pressure))
                 return new, self._loaded(new, start, previous.pressure)
         return new, self.from_rest(new)
+
+    def leg(self, old: SealSystem, x: Array, new: SealSystem) -> State:
+        """The contact state x (n,) of one mesh on another, under the higher pressure of that.
+
+        Where it is not found on the new mesh under its own pressure, the old mesh is kept.  Raises
+        StageError.
+        """
+        begin = Checkpoint(old, old.parameters.sealed_pressure, x)
+        try:
+            start = self._corrected(begin, new, _at(begin.pressure))
+        except StageError:
+            new, start = build_system(new.parameters, old.section.layout), x
+        return new, self._loaded(new, start, begin.pressure)
 
     def _corrected(self, state: Checkpoint, new: SealSystem, name: str) -> Array:
         """A state of another mesh on ours, (n,), under the same pressure."""
@@ -173,10 +190,9 @@ class ContactSolver:
         self, system: SealSystem, x: Array, begin: float = 0.0, position: float | None = None
     ) -> Array:
         """From the section x (n,) to the sealed pressure; begin, position: as of `load_stage`."""
-        if not begin:
-            self.checkpoint = None
         path_stage = load_stage(system, begin, position)
-        path_stage = replace(path_stage, on_point=lambda point: self.keep(system, point))
+        self.checkpoints = [state for state in self.checkpoints if state.pressure < begin]
+        path_stage = replace(path_stage, on_point=lambda point: self.keep(system, point, begin))
         try:
             return self._follow(system, path_stage, x)
         except StageError as failed:
@@ -186,11 +202,21 @@ class ContactSolver:
                     return self.driver.follow(self._creep(system), last)
             raise
 
-    def keep(self, system: SealSystem, point: Point) -> None:
-        """A state of a path of the pressure. With friction none: what slips remembers its path."""
-        p = system.parameters
-        if 0.0 < point.parameter <= _SHARE * p.sealed_pressure and not p.rubs:
-            self.checkpoint = Checkpoint(system, point.parameter, point.solution.x)
+    def keep(self, system: SealSystem, point: Point, begin: float = 0.0) -> None:
+        """A state of a path of the pressure. With friction none: what slips remembers its path.
+
+        begin: where the path was taken up, MPa. From rest one state is kept, else one a leg.
+        """
+        p, pressure = system.parameters, point.parameter
+        leg = 0.9 * LEG * p.shear_modulus  # a step that ends just before a leg does counts
+        highest = max(begin, p.sealed_pressure - leg) if begin else _SHARE * p.sealed_pressure
+        if p.rubs or not 0.0 < pressure <= highest:
+            return
+        if not begin:
+            self.checkpoints = []
+        last = self.checkpoints[-1].pressure if self.checkpoints else -leg
+        if pressure == begin or pressure >= last + leg:
+            self.checkpoints.append(Checkpoint(system, pressure, point.solution.x))
 
     def _creep(self, system: SealSystem) -> Stage:
         """From a state under any pressure to the sealed pressure."""
@@ -205,3 +231,8 @@ class ContactSolver:
         if p.solver == "auto" and not p.rubs:
             path_stage = replace(path_stage, corrector=PressureNewton(self.driver.newton, system))
         return self.driver.follow(path_stage, x)
+
+
+def _at(pressure: float) -> str:
+    """Name of the stage that corrects a state under a pressure."""
+    return f"contact at {pressure:.4g} MPa"
