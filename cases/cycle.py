@@ -89,6 +89,11 @@ class Cycle(Seal):
                 f"housing_friction = {self.housing_friction:g} is not available in a cycle, which "
                 "holds the section; leave housing_friction out"
             )
+        if self.heating:
+            raise ValueError(
+                "heating = true: the heat of a film is known in steady state only, not in a cycle; "
+                "leave heating out"
+            )
         if not self.path.speed.largest > 0.0 or not self.path.speed.values[0] > 0.0:
             raise ValueError("motion: the rod must begin with an outstroke, U > 0 at t = 0")
         require_films(self, self.sealed_pressure)

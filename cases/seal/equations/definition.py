@@ -267,7 +267,7 @@ def film_values(p: Seal, film: FilmLoads) -> Values:
     return {
         "rod_radius": 0.5 * p.rod_diameter,
         "rod_speed": film.rod_speed,
-        "viscosity": p.viscosity,
+        "viscosity": p.viscosity * film.viscosity_ratio,
         "pressure_viscosity": p.pressure_viscosity,
         "cavitation_penalty": p.cavitation_penalty,
         "force_weight": 1.0,

@@ -28,7 +28,10 @@ CONSTANT = 0.51212
 BY_VISCOSITY, BY_CURVATURE = 0.345, -0.86
 """Derivatives of ln H* by A and by B, by differences of `local_inlet`."""
 
-FACTOR = CONSTANT * 6.0**0.6
+SPEED_POWER = 0.6
+"""Power of eta U that h* is as."""
+
+FACTOR = CONSTANT * 6.0**SPEED_POWER
 """Constant 1.5006 of h* = 1.5006 (eta U)^0.6 E*^0.2 K^-0.8."""
 
 
@@ -178,7 +181,13 @@ def _carreau_curve(exponent: float, plateau: float) -> tuple[Array, Array]:
 @lru_cache(maxsize=256)
 def thinned(oil: ThinningOil) -> float:
     """h* of an oil that thins, over that of a Newtonian one of its viscosity at rest."""
-    return local_inlet(oil=oil).H_star / local_inlet().H_star
+    return local_inlet(oil=oil).H_star / newtonian_inlet().H_star
+
+
+@lru_cache(maxsize=1)
+def newtonian_inlet() -> LocalInlet:
+    """The local problem at A = B = 0."""
+    return local_inlet()
 
 
 # --- the local problem --------------------------------------------------------------------------
@@ -186,12 +195,16 @@ def thinned(oil: ThinningOil) -> float:
 
 @dataclass(frozen=True)
 class LocalInlet:
-    """Solution of the local problem: X, P, H (n,), and H*; X < 0 is inside the contact."""
+    """Solution of the local problem: X, P, H (n,), and H*; X < 0 is inside the contact.
+
+    by_viscosity: (n - 1,) derivatives of ln H* by the logarithms of the viscosities between nodes.
+    """
 
     X: Array
     P: Array
     H: Array
     H_star: float
+    by_viscosity: Array
 
 
 def local_inlet(
@@ -261,7 +274,10 @@ def local_inlet(
         limit = 0.7 * np.min(-unknowns[n:][falls] / step[n:][falls], initial=np.inf)
         unknowns = unknowns + min(1.0, limit) * step
         if limit >= 1.0 and np.abs(step).max() < 1e-9:
-            return LocalInlet(X, unknowns[:n], unknowns[n : 2 * n], float(unknowns[-1]))
+            adjoint = np.linalg.solve(J.T, np.eye(2 * n + 1)[-1])
+            by_viscosity = -adjoint[n - 1 : 2 * n - 2] * slope / unknowns[-1]
+            P, H, H_star = unknowns[:n], unknowns[n : 2 * n], float(unknowns[-1])
+            return LocalInlet(X, P, H, H_star, by_viscosity)
     raise ArithmeticError(f"the local problem of the inlet has no solution at A = {A:g}, B = {B:g}")
 
 

@@ -41,6 +41,7 @@ class FilmLoads:
     coefficient of time derivatives, 1/s, 0 where nothing changes. inflow: void fractions at the
     sealed and the air end, where oil comes in. entrance: pressure that oil has built up before the
     arc, MPa. slip: speed at which the friction of asperities has 0.7 of its value, mm/s.
+    viscosity_ratio: viscosity in a warm inlet over that of the cold oil.
     """
 
     sealed_pressure: float
@@ -54,6 +55,7 @@ class FilmLoads:
     inflow: tuple[float, float] = (0.0, 0.0)
     entrance: float = 0.0
     slip: float = SLIP
+    viscosity_ratio: float = 1.0
 
     @property
     def end_pressures(self) -> Array:

@@ -6,11 +6,12 @@ dynamic viscosity in MPa s and the pressure-viscosity coefficient in 1/MPa.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import log, log10
 from typing import Any
 
+import numpy as np
 from scipy.constants import zero_Celsius
 from scipy.optimize import brentq
 
@@ -18,6 +19,10 @@ from softehl.cases.seal.gland.key_values import number, put
 from softehl.cases.seal.gland.records import THICKEST, Oil
 from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.oil_names import GRADES, read_oil_name
+from softehl.runtime.arrays import Array
+
+Viscosity = Callable[[Array], Array]
+"""Rise of the temperature (n,), K -> viscosity over that of the cold oil (n,)."""
 
 DENSITY = 870.0
 """At 15 degC, of a mineral oil, kg/m^3."""
@@ -122,6 +127,23 @@ def density(temperature: float, at_15: float = DENSITY) -> float:
     It falls by 0.65 kg/m^3 for each degC; that of lubricants by 0.63 in ASTM D1250.
     """
     return at_15 - 0.65 * (temperature - 15.0)
+
+
+def relative_viscosity(oil: str, temperature: float, at_15: float | None) -> Viscosity:
+    """Dynamic viscosity of an oil by the rise of its temperature, over that at a temperature.
+
+    at_15: its density at 15 degC, None for that of its family.
+    """
+    law, family = read_oil(oil), read_oil_name(oil).family
+    given = at_15 or (family.density if family else DENSITY)
+
+    def dynamic(heat: Array) -> Array:
+        kelvin = heat + zero_Celsius
+        nu = 10.0 ** (10.0 ** (law.A - law.B * np.log10(kelvin))) - 0.7
+        return np.asarray(nu * (given - 0.65 * (heat - 15.0)))
+
+    cold = float(dynamic(np.array(temperature)))
+    return lambda rise: dynamic(temperature + rise) / cold
 
 
 def barus(viscosity: float) -> float:

@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from softehl.cases.harness.parameters import Parameters
 from softehl.cases.seal.gland.fit_geometry import fitted
-from softehl.cases.seal.gland.oils import with_oil
+from softehl.cases.seal.gland.oils import Viscosity, relative_viscosity, with_oil
 from softehl.cases.seal.gland.records import (
     Duty,
     FilmModel,
@@ -104,6 +104,13 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
         """Roughness, asperities and their friction; on rigid asperities E* = 4 G of the seal."""
         stiffness = self.asperity_stiffness or 4.0 * self.surface_modulus
         return SurfacePair.of(self.roughness, stiffness, self.boundary_friction)
+
+    @property
+    def warm_viscosity(self) -> Viscosity:
+        """Viscosity by the rise of the temperature, over that of the cold oil, with heating."""
+        assert self.oil is not None
+        assert self.temperature is not None
+        return relative_viscosity(self.oil, self.temperature, self.oil_density)
 
     @property
     def predictable(self) -> bool:

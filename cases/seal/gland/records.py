@@ -372,6 +372,9 @@ class FilmModel(FreeSeal, Surfaces):
         1.0e4, "penalty of pressures below zero, flux for a pressure", unit="mm/(MPa s)", gt=0
     )
     shear_traction: bool = key(True, "whether the shear stress of the film acts on the seal")
+    heating: bool = key(
+        False, "whether friction warms the film, in steady state; needs an oil and its temperature"
+    )
     arc_start: float | None = key(
         None,
         "sealed end of the lubricated arc, from the bottom",

@@ -92,6 +92,21 @@ def _film_has_its_model(p: Seal) -> None:
         raise ValueError("arc_start and arc_end: give both, or none to have them found")
 
 
+def _heating_has_its_oil(p: Seal) -> None:
+    if not p.heating:
+        return
+    if p.sensitivity:
+        raise ValueError(
+            "heating = true with sensitivity = true: sensitivities are those of a film of one "
+            "temperature; leave one of them out"
+        )
+    if p.oil is None or p.temperature is None:
+        raise ValueError(
+            "heating = true needs the viscosity of the oil over temperature: give an oil and its "
+            'temperature, as in oil = "ISO VG 46" and temperature = "40 degC"'
+        )
+
+
 def _air_side_is_closed_or_open(p: Gland) -> None:
     gap, depth = p.extrusion_gap, p.depth
     if p.backup and gap:
@@ -219,6 +234,7 @@ _CHECKS = (
     _rubber_has_an_element,
     _discretisation_is_rich_enough,
     _film_has_its_model,
+    _heating_has_its_oil,
     _air_side_is_closed_or_open,
     _section_is_one,
     _seal_is_squeezed,

@@ -9,7 +9,8 @@ LEFT_OUT = (
     "Time: every speed is a steady state; no start, no stop, no dwell.",
     "Breakaway: the force to start after a rest, which grows with the time at rest.",
     "Viscoelasticity and set: the rubber is hyperelastic, and as it was made.",
-    "Heat: oil and rubber are at one temperature, which friction does not raise.",
+    "Heat: oil and rubber are at one temperature, which friction does not raise, unless the case "
+    "has heating; rod and housing do not become warm over many strokes.",
     "Shear thinning, unless the case has keys for it: the oil is then Newtonian.",
     "Roughness of rod and seal, unless the case has keys for it: a film thinner than the surfaces "
     "are rough is not what the numbers say.",

@@ -40,6 +40,7 @@ WITHOUT_INFLUENCE = (
     *(*Seal.names, "ogden_terms", "glass_transition"),  # values of others follow
     *(*Oil.model_fields, *Surfaces.model_fields, *Numerics.model_fields),
     *("cavitation", "cavitation_pressure", "cavitation_penalty", "shear_traction"),
+    "heating",
     *("stroke", "speeds", "travel", "service", "error_estimate", "tolerance", "upwinding"),
     *("pressure_order", "reynolds", "quadrature", "quadrature_points"),
 )

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf
+from math import exp, inf, log
 
+from softehl.cases.seal.equations.film_heat import changed_film
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.solve.correctors import FilmCorrectors
@@ -34,6 +35,12 @@ from softehl.runtime.solve.solution import Point, Solution, Status
 _LEAST = 0.06
 """Least step on the way from the film at another speed, of the larger power of U. Of the smaller
 one films that do not go on cost as much again as all of their seal."""
+
+WARM = 1e-4
+"""Relative change of h* by its heat that is not solved for."""
+
+_WARMINGS, _STEP = 12, 0.3
+"""Solutions with another viscosity at most, and its largest change in one of them, of ln eta."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,17 +207,38 @@ class FilmSolver:
 
     def _entered(
         self, squeeze_film: SqueezeFilm, correctors: FilmCorrectors, result: Solution
-    ) -> Film:
+    ) -> Film | NoFilm:
         """The film, with the pressure of the wedge before its arc where it lacks much of it.
 
-        Without it where no such film is found.
+        Without it where no such film is found. Then it is warmed by its friction.
         """
         film = Film(squeeze_film, result, correctors)
         if not film.numbers.enters:
-            return film
+            return self._warmed(film)
         more = replace(squeeze_film, film=replace(film.loads, entrance=film.numbers.entrance))
         end = correctors.steady().solve(more.steady(film.x), film.x)
-        return Film(more, end, correctors) if end.converged else film
+        return self._warmed(Film(more, end, correctors) if end.converged else film)
+
+    def _warmed(self, film: Film) -> Film | NoFilm:
+        """The film with the viscosity of its warm inlet, solved until h* does not change."""
+        before: tuple[float, float] | None = None
+        for _ in range(_WARMINGS):
+            heat, used = film.numbers.heat, film.loads.viscosity_ratio
+            if heat is None or changed_film(heat.viscosity_ratio, used) < WARM:
+                return film
+            at, change = log(used), log(heat.viscosity_ratio / used)
+            slope = 0.0 if before is None else (change - before[1]) / (at - before[0]) + 1.0
+            before = at, change
+            step = change / (1.0 - min(slope, 0.0))
+            ratio = exp(at + min(max(step, -_STEP), _STEP))
+            loads = replace(film.loads, viscosity_ratio=ratio)
+            warm = replace(film.squeeze_film, film=loads)
+            end = film.correctors.steady().solve(warm.steady(film.x), film.x)
+            if not end.converged:
+                break
+            film = Film(warm, end, film.correctors)
+        message = "the film that its friction warms was not found; leave heating out"
+        return NoFilm(film.loads.stroke, film.loads.speed, Status.MAX_ITERATIONS, message)
 
     def _log(self, squeeze_film: SqueezeFilm) -> LoadStageLog:
         """A stage on the way to a film."""

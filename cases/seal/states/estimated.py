@@ -70,11 +70,14 @@ class Estimated:
         Length of the inlet over its pocket.
     error : float
         Largest error, %.
+    inlet_rise : float
+        Rise of the temperature in the inlet, K; 0 without heating.
     """
 
     h_star: float
     over_pocket: float
     error: float
+    inlet_rise: float
 
     @classmethod
     def of(
@@ -95,7 +98,8 @@ class Estimated:
             over_pocket *= np.exp(0.4 * POCKET * lacking)
         h_star *= 1.0 + MESH_ERROR * (2.0 / float(system.section.density)) ** 2
         is_computed = over_pocket <= APPLIES and (stroke == "out" or computed(p, stroke))
-        return cls(float(h_star), float(over_pocket), ERRORS[stroke] if is_computed else ORDER)
+        error = ERRORS[stroke] if is_computed else ORDER
+        return cls(float(h_star), float(over_pocket), error, estimate.inlet_rise)
 
 
 def estimated_state(
@@ -121,6 +125,7 @@ def estimated_state(
         h_star_error_percent=estimate.error,
         h_star_theory_um=estimate.h_star / MICROMETRE,
         inlet_over_pocket=estimate.over_pocket,
+        inlet_heating_K=estimate.inlet_rise if p.heating else nan,
         h_min_um=nan,
         p_max_MPa=float(pressure.max()),
         pressure_jump_max_MPa=0.0,

@@ -7,7 +7,17 @@ from math import exp
 
 import numpy as np
 
-from softehl.cases.seal.equations.inlet_theory import Edge, ThinningOil, incremental_modulus
+from softehl.cases.seal.equations.film_heat import (
+    inlet_mean,
+    moving_half_space,
+    warm_film,
+)
+from softehl.cases.seal.equations.inlet_theory import (
+    Edge,
+    ThinningOil,
+    incremental_modulus,
+    newtonian_inlet,
+)
 from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.gland.parameters import Seal
@@ -17,6 +27,9 @@ from softehl.runtime.arrays import Array, Integers
 
 REACH, FEWEST_NODES = 3.0, 5
 """Length of the fit of K, in lengths of the inlet, and the nodes that it has at least."""
+
+INSIDE = 20.0
+"""Lengths of the inlet within the contact whose heat is counted in the inlet's."""
 
 APPLIES = 0.1
 """Largest length of the inlet over the pocket before it: at 0.06 and 0.23 the theory was 2 and
@@ -35,11 +48,14 @@ class Prediction:
         Length of the inlet over the pocket of oil before it.
     edge : Edge
         The edge of the dry contact.
+    inlet_rise : float
+        Rise of the temperature in the inlet by its friction, K; 0 without heating.
     """
 
     h_star: float
     over_pocket: float
     edge: Edge
+    inlet_rise: float = 0.0
 
     @property
     def applies(self) -> bool:
@@ -94,11 +110,48 @@ def predicted(
             return None
         length = edge.length(flow)
     assert edge is not None
+    inlet_rise = 0.0
+    if p.heating:
+        ratio, inlet_rise = warm_inlet(p, edge, flow=flow, speed=speed)
+        flow *= ratio
     try:
         h_star = edge.h_star(flow, p.pressure_viscosity, _thinning_oil(p))
     except ArithmeticError:
         return None
-    return Prediction(h_star, length / edge.pocket, edge)
+    return Prediction(h_star, length / edge.pocket, edge, inlet_rise)
+
+
+def warm_inlet(p: Seal, edge: Edge, flow: float, speed: float) -> tuple[float, float]:
+    """Viscosity of the warm inlet over that of the cold oil, and its rise of the temperature, K.
+
+    The heat is that of the local problem, from the end of the pocket to `INSIDE` lengths within the
+    contact. flow: eta U of the cold oil before the inlet.
+    """
+    found, law, ratio, rise = newtonian_inlet(), p.warm_viscosity, 1.0, 0.0
+    for _ in range(20):
+        length, unit = edge.length(ratio * flow), edge.thickness(ratio * flow)
+        part = (found.X[1:] > -INSIDE) & (found.X[:-1] < max(edge.pocket / length, 5.0))
+        X, P, H = (0.5 * (a[1:] + a[:-1])[part][::-1] for a in (found.X, found.P, found.H))
+        slope = (np.diff(found.P) / np.diff(found.X))[part][::-1] * edge.rise**0.5 / length**0.5
+        h = unit * H
+        pressure = edge.rise**0.5 * length**0.5 * P
+        eta = ratio * flow / speed * np.exp(p.pressure_viscosity * pressure)
+        width = length * np.diff(found.X)[part][::-1]
+        warm = warm_film(
+            moving_half_space(-length * X, width, speed),
+            width,
+            h=h,
+            heat=eta * speed**2 / h + h**3 * slope**2 / (12.0 * eta),
+            flux=0.5 * speed * unit * found.H_star,
+            height=p.depth,
+        )
+        h_star = unit * found.H_star
+        rise = inlet_mean(h, h_star, warm.oil)
+        wanted = float(np.exp(inlet_mean(h, h_star, np.log(law(warm.oil)))))
+        if abs(wanted / ratio - 1.0) < 1e-5:
+            break
+        ratio = (ratio * wanted) ** 0.5
+    return ratio, rise
 
 
 def _thinning_oil(p: Seal) -> ThinningOil | None:

@@ -15,6 +15,7 @@ from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.gland.surfaces import MICROMETRE, regime
 from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film, contact_level, groups
+from softehl.cases.seal.states.heat import FilmHeat, film_heat
 from softehl.cases.seal.states.mesh_indicators import (
     INLET,
     THIN,
@@ -63,6 +64,12 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
     q, variation, jump = _flux(system, problem, at, x, top)
     h_star = q / (0.5 * film.rod_speed)
     within = min(level, THIN * h_star) if h_star > 0.0 else level
+    heat = None
+    if system.parameters.heating:
+        out = film.stroke == "out"
+        drawn = slice(first.start, top + 1) if out else slice(top, first.stop)
+        heat = film_heat(system, at, film, drawn, h_star)
+        at = heat.warmed(at)
     drag, friction = (
         float(system.around * (tau * at["dx"]).sum())
         for tau in (0.5 * (at["tau_rod"] + at["tau"]), at["tau_rod"])
@@ -99,6 +106,7 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         fluxes=() if system.parameters.conserving else parted_fluxes(at),
         drag=drag,
         beyond=beyond / abs(friction),
+        heat=heat,
     )
 
 
@@ -286,7 +294,8 @@ def film_state(
         entrance_pressure_MPa=film.entrance,
         verdict=verdict.word,
         advice=verdict.advice,
-        profile=_profile(system, problem, x),
+        **_heat(numbers),
+        profile=_profile(system, problem, x, numbers.heat),
         section=section_view(system, x, film_pressure(system, x)),
     )
 
@@ -305,7 +314,21 @@ def _groove(numbers: FilmNumbers) -> dict[str, Any]:
     }
 
 
-def _profile(system: SealSystem, problem: Problem, x: Array) -> Profile:
+def _heat(numbers: FilmNumbers) -> dict[str, Any]:
+    """Columns of the heat of a film; none without heating."""
+    heat = numbers.heat
+    if heat is None:
+        return {}
+    return {
+        "inlet_heating_K": heat.inlet,
+        "film_heating_K": heat.peak,
+        "heat_to_rod_W": heat.to_rod,
+        "heat_to_seal_W": heat.to_seal,
+        "heat_in_oil_W": heat.carried,
+    }
+
+
+def _profile(system: SealSystem, problem: Problem, x: Array, heat: FilmHeat | None) -> Profile:
     """Fields at the quadrature points of the film, from the sealed to the air side.
 
     Discontinuous pressures are also shown at both ends of each segment: a facet has two rows.
@@ -315,6 +338,8 @@ def _profile(system: SealSystem, problem: Problem, x: Array) -> Profile:
         traces = trace_rule(p.pressure_order, p.quadrature, p.quadrature_points)
         block = replace(block, rule=traces)
     values = block.fields(x, problem.parameters[FILM])
+    if heat is not None:
+        values = heat.warmed(values)
     at = {name: value.ravel() for name, value in values.items()}
     return Profile(
         x_mm=at["x"],

@@ -181,6 +181,13 @@ class FilmRow(Row):
         "length of the inlet over the pocket of oil before it; the theory applies up to 0.1",
         default=nan,
     )
+    inlet_heating_K: float = column(
+        "K", "rise of the oil's temperature in the inlet; nan without heating", default=nan
+    )
+    film_heating_K: float = column("K", "largest rise of the temperature in the film", default=nan)
+    heat_to_rod_W: float = column("W", "heat of the friction that goes into the rod", default=nan)
+    heat_to_seal_W: float = column("W", "heat that goes into the seal", default=nan)
+    heat_in_oil_W: float = column("W", "heat that the oil carries out of the film", default=nan)
     density: int = column(
         "", "density of the mesh of the state: above that of the run where its error was too large"
     )

@@ -8,6 +8,7 @@ from math import inf, isfinite, nan
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.surfaces import FULL
+from softehl.cases.seal.states.heat import FilmHeat
 from softehl.cases.seal.states.state import (
     CLIPPED,
     COLLAPSED,
@@ -122,7 +123,7 @@ class FilmNumbers:
     on, where there are several; h_star is then that of the first one on the way of the oil that has
     a peak of its own. fluxes: of the parts of a film that cavitates between them. drag: the part of
     the friction that is not of the slope of the pressure. beyond: friction of the oil beyond both
-    ends of the arc, which it does not have, relative to it.
+    ends of the arc, which it does not have, relative to it. heat: of its friction, with heating.
     """
 
     speed: float
@@ -147,6 +148,7 @@ class FilmNumbers:
     fluxes: tuple[float, ...] = ()
     drag: float = nan
     beyond: float = 0.0
+    heat: FilmHeat | None = None
 
     @property
     def mismatch(self) -> float:
