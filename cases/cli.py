@@ -170,7 +170,8 @@ def sweep(
     "--out",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help="File of the report  [default: report.html in the first DIR]",
+    help="File of the report  [default: report.html in DIR, of several comparison.html in the "
+    "first]",
 )
 @click.option("--xlsx", is_flag=True, help="Also write its tables as .xlsx.")
 @click.option(
@@ -191,7 +192,8 @@ def report_runs(
     """
     if system is not None:
         return _hand_over(folders, system)
-    _write_report(folders, out or folders[0] / "report.html", xlsx=xlsx, quiet=False)
+    name = "report.html" if len(folders) == 1 else "comparison.html"
+    _write_report(folders, out or folders[0] / name, xlsx=xlsx, quiet=False)
     return 0
 
 
@@ -254,7 +256,10 @@ def _write_report(folders: tuple[Path, ...], path: Path, *, xlsx: bool, quiet: b
 
 def _require_page(path: Path, option: str) -> None:
     if path.suffix not in (".html", ".htm"):
-        raise BadInput(f'{option} {str(path)!r}: a report is a page; allowed: a name with ".html"')
+        pdf = " (a browser prints it to PDF)" if path.suffix.lower() == ".pdf" else ""
+        raise BadInput(
+            f'{option} {str(path)!r}: a report is a page{pdf}; allowed: a name with ".html"'
+        )
 
 
 def _write(

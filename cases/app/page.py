@@ -488,7 +488,7 @@ def _messages(run: Run) -> str:
     fits = [f"{name} {value:.4g} {unit}" for name, (value, unit) in fit_numbers(p).items()]
     messages = [*case.warnings(p), *case.foreword(p)]
     if assumed := case.assumed(p, run.set_keys):
-        messages.append(f"assumed: {', '.join(assumed)}")
+        messages.append(f"assumed: {'; '.join(assumed)}")
     return "\n".join(f"- {html.escape(line)}" for line in (*fits, *messages))
 
 

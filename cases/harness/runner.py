@@ -208,7 +208,7 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
         for line in case.details(record.run.parameters, record.folder):
             click.echo(line)
         if assumptions := case.assumed(record.run.parameters, record.run.set_keys):
-            click.echo(f"assumed: {', '.join(assumptions)}")
+            click.echo(f"assumed: {'; '.join(assumptions)}")
         for note in case.notes(rows, record.advice):
             click.echo(note)
     if not quiet:

@@ -195,7 +195,7 @@ def _summary(run: FinishedRun) -> list[str]:
         *summary,
         *run.case.notes(run.rows, advice_of(run.content, run.rows)),
         *(run.content.get("warnings") or ()),
-        *([f"assumed: {', '.join(assumed)}"] if assumed else []),
+        *([f"assumed: {'; '.join(assumed)}"] if assumed else []),
         *run.case.cautions(run.parameters),
     ]
 

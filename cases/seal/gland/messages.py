@@ -77,17 +77,19 @@ def _load(p: Seal, pressure: float) -> tuple[str, bool]:
     """The ratio of pressure to modulus in words, and whether it is above what is known to run."""
     ratio = p.load_ratio(pressure)
     if p.round:
-        limit = 3.0
+        limit, sound = 3.0, 4.0
         sample = (
             "in a sample of O-rings all films were found at ratios to 4, nine of ten at 4 to 5; "
             "above 5 h* of instrokes is estimated by theory, above 8 that of outstrokes too"
         )
     else:
-        limit = 2.0
+        limit, sound = 2.0, 2.0
         sample = (
             "in a sample of sections other than round all films were found at ratios to 2, "
             "four of five at 2 to 4, half of them at 4 to 5; nothing was tried above 4.9"
         )
+    if ratio <= limit:
+        sample = f"all films of a sample were found at ratios to {sound:g}"
     message = f"sealed pressure / shear modulus = {ratio:.2g}: {sample} (docs/limits.md)"
     return message, ratio > limit
 
@@ -209,8 +211,13 @@ def _cold(p: Seal) -> Iterator[str]:
     if p.oil is None:
         return
     name = read_oil_name(p.oil)
-    measured = [at for _, at in name.points] or ([40.0, 100.0] if name.family else [])
-    if measured and heat < min(0.0, *measured):
+    if name.family and not name.points and heat < 0.0:
+        yield (
+            f"temperature = {heat:g} degC: the viscosity of {p.oil} is extrapolated from 40 and "
+            f"100 degC; below its pour point a {name.family.kind} does not flow (see its data "
+            "sheet)"
+        )
+    if name.points and heat < min(0.0, *(at for _, at in name.points)):
         yield (
             f"temperature = {heat:g} degC is below both viscosities of the oil: it is "
             "extrapolated, and below its pour point the oil does not flow (see its data sheet)"
@@ -295,10 +302,13 @@ def _ring(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
         yield f"a rubber {ring_name.rubber}, as {ring_name.standard} asks for"
     if p.shore_A is not None:
         low, high = shore_band(p.shore_A, p.polymer)
-        yield (
-            f"a shear modulus of {p.shear_modulus:.3g} MPa by hardness, known to {low:+.0f} and "
-            f"{high:+.0f} %"
-        )
+        known = f"by hardness, known to {low:+.0f} and {high:+.0f} %"
+        factor, text = _stiffer(p, p.glass), f"a shear modulus of {p.shear_modulus:.3g} MPa"
+        if factor == 1.0:
+            yield f"{text} {known}"
+        else:
+            room = f"{p.shear_modulus / factor:.3g} MPa {known}"
+            yield f"{text}: {room}, times {factor:.3g} at {p.temperature:g} degC{_by_glass(p)}"
         yield from _hardness(p)
     elif p.energy == "mooney_rivlin" and len(unsaid := {"mu_1", "mu_2"} - keys_set) == 1:
         (name,) = unsaid
@@ -313,16 +323,16 @@ def _hardness(p: Seal) -> Iterator[str]:
     if rubber and rubber.hardness_text:
         chart = " (chart of ASTM D2240)" if "D" in rubber.hardness_text.split() else ""
         yield f"{rubber.hardness_text} as {p.shore_A:g} Shore A{chart}"
-    if p.temperature is None:
-        return
-    factor = _stiffer(p, p.glass)
-    if factor == 1.0:
+    if p.temperature is not None and _stiffer(p, p.glass) == 1.0:
         yield f"its modulus at room temperature, not at {p.temperature:g} degC"
-    elif p.glass is not None and p.glass_transition is None:
-        yield (
-            f"{factor:.3g} times its modulus at room temperature, by a glass transition of "
-            f"{p.glass:g} degC, typical of {p.polymer}"
-        )
+
+
+def _by_glass(p: Seal) -> str:
+    """The glass transition that a modulus follows from, in words."""
+    if p.glass is None:
+        return ""
+    typical = f", typical of {p.polymer}" if p.glass_transition is None else ""
+    return f" by a glass transition of {p.glass:g} degC{typical}"
 
 
 def _gland(p: Gland, keys_set: frozenset[str]) -> Iterator[str]:

@@ -82,6 +82,9 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
                 *("breakaway", "breakaway_force", "rest", "rest_time", "dwell", "stiction"),
             ),
             "extrusion_gap": ("gap", "clearance"),
+            "boundary_friction with a roughness, or housing_friction": (
+                *("friction", "mu_friction", "friction_coefficient", "cof"),
+            ),
             "squeeze": ("compression", "interference"),
             'material = "neo-hooke" and mu, a third of Young\'s modulus': (
                 *("youngs_modulus", "young", "young_modulus", "e", "e_modulus", "elastic_modulus"),

@@ -643,7 +643,8 @@ def _lever(p: Seal, key: str) -> Lever:
     base, _ = BASES.get(name, (name, name))
     names = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
     if base not in names:
-        hint = f" ({INSTEAD[base]})" if base in INSTEAD else did_you_mean(base, names)
+        instead = INSTEAD.get(base) or Seal.hints.get(base.lower())
+        hint = f" ({instead})" if instead else did_you_mean(base, names)
         raise BadInput(f"--by {base}{hint}: allowed: {', '.join([*names, *BASES])}")
     return Lever(name if name in BASES else p.called(base), base)
 
