@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.definition.problem_definition import Block
+from softehl.runtime.definition.argument_checks import writable
+from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.dofmap import AXES
 from softehl.runtime.io import replacing, write_text
 from softehl.runtime.mesh.cells import linear_pieces
 from softehl.runtime.mesh.readers.meshio import import_meshio
+
+if TYPE_CHECKING:
+    from softehl.runtime.equations.system import System
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +101,52 @@ class VtuFields:
             "</VTKFile>",
         ]
         write_text(path, "\n".join(lines) + "\n")
+
+
+def write_target(path: str | Path, system: System) -> Path:
+    """Path of a .vtu or .pvtu file in an existing folder.  Raises StudyError."""
+    context, target = f"write({str(path)!r})", Path(path)
+    if target.suffix not in (".vtu", ".pvtu"):
+        raise StudyError(f"{context}: results are written as .vtu or .pvtu")
+    if target.suffix == ".vtu" and system.mesh.piece is not None:
+        raise StudyError(f"{context}: of a mesh in parts results are .pvtu")
+    writable(context, target)
+    return target
+
+
+def write_file(target: Path, system: System, fields: VtuFields) -> None:
+    """Write the fields of the whole mesh by one process."""
+    if system.comm.is_root:
+        fields.write(target)
+    system.comm.barrier()
+
+
+def write_pieces(target: Path, system: System, local_fields: VtuFields) -> None:
+    """Write the fields of each process, and the index of all."""
+    rank, size = system.comm.rank_and_size
+    pieces, piece = piece_names(target, size), local_fields.compact()
+    piece.write(target.with_name(pieces[rank]))
+    system.comm.barrier()
+    if system.comm.is_root:
+        piece.write_index(target, pieces)
+    system.comm.barrier()
+
+
+def local_cells(system: System) -> dict[str, Integers]:
+    """Cells of the elements of this process; on process 0 also those that have no elements."""
+    mesh, blocks = system.mesh, system.everywhere.blocks.values()
+    if mesh.piece is not None:
+        return dict(mesh.cells)
+    cells_of_process = {}
+    for kind, cells in mesh.cells.items():
+        block_nodes = [b.nodes for b in system.blocks.values() if b.kind == kind]
+        if system.comm.is_root:
+            with_elements = {
+                tuple(row) for b in blocks if b.kind == kind for row in b.nodes.tolist()
+            }
+            block_nodes.append(cells[[tuple(row) not in with_elements for row in cells.tolist()]])
+        cells_of_process[kind] = np.unique(np.concatenate([cells[:0], *block_nodes]), axis=0)
+    return cells_of_process
 
 
 def piece_names(path: Path, count: int) -> list[str]:

@@ -13,8 +13,9 @@ with the linear shape functions.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -27,8 +28,44 @@ from softehl.runtime.kernels.kernel_call import Rule
 from softehl.runtime.mesh.cells import CELLS, Cell
 from softehl.runtime.suggestions import join_names
 
+if TYPE_CHECKING:
+    from softehl.runtime.equations.system import System
+
 RECOVERIES = ("projection", "mean", "spr")
 """How a field comes from the points of a cell to its nodes."""
+
+
+def nodal_fields(
+    system: System, name: str, fields: Mapping[str, Array], recovery: str
+) -> dict[str, Array]:
+    """Fields of a block at all nodes, (points,), nan outside the block.
+
+    fields: at the points of the elements of this process; for "spr", of all. Raises StudyError.
+    """
+    if recovery == "spr":
+        return _recovered_by_patches(system, name, fields)
+    nodes, operator = nodal_operator(system.blocks[name], recovery)
+    points, piece = len(system.mesh.points), system.mesh.piece
+
+    def sums(weights: Array) -> Array:
+        local_sums = np.bincount(nodes.ravel(), weights.ravel(), points).astype(np.float64)
+        return system.comm.sum(local_sums) if piece is None else piece.added(local_sums)
+
+    count = sums(np.ones(nodes.shape))
+    return {
+        label: np.where(count > 0, sums(values @ operator.T) / np.maximum(count, 1), np.nan)
+        for label, values in fields.items()
+    }
+
+
+def _recovered_by_patches(
+    system: System, name: str, fields: Mapping[str, Array]
+) -> dict[str, Array]:
+    if not fields:
+        return {}
+    values = np.stack(list(fields.values()), axis=2)
+    nodal = recover_block(system.everywhere.blocks[name], system.everywhere.mesh.points, values)
+    return {label: nodal[:, k] for k, label in enumerate(fields)}
 
 
 def nodal_operator(block: Block, recovery: str) -> tuple[Integers, Array]:

@@ -11,32 +11,31 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from softehl.errors import UnknownNameError
-from softehl.log import warn
-from softehl.runtime.arrays import Array, Integers, read_only
+from softehl.runtime.arrays import Array, read_only
 from softehl.runtime.contact.pair_law import PairLawKernel, fields_of_law
-from softehl.runtime.definition.argument_checks import writable
-from softehl.runtime.definition.problem_definition import Block, RigidBody, StudyError
-from softehl.runtime.discretisation.loads import Spring, Tie
+from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.problem import Problem
-from softehl.runtime.discretisation.rotations import spin_by_rotation
 from softehl.runtime.equations.eigenproblems import natural_modes
-from softehl.runtime.equations.interpolation import (
-    at_every_node,
-    interpolate_nodal,
-    interpolate_unknowns,
-)
+from softehl.runtime.equations.interpolation import at_every_node
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.stability import negative_directions
 from softehl.runtime.kernels.constitutive_model import ModelKernel, PointState
 from softehl.runtime.kernels.explanation import Explanation
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.mesh import MeshError, place_text
 from softehl.runtime.mesh.plotting import picture_file, show_or_save
 from softehl.runtime.results.explanation import block_called, explain_element
 from softehl.runtime.results.integrals import integral
-from softehl.runtime.results.output import VtuFields, piece_names
+from softehl.runtime.results.output import (
+    VtuFields,
+    local_cells,
+    write_file,
+    write_pieces,
+    write_target,
+)
 from softehl.runtime.results.plotting import picture_of
-from softehl.runtime.results.recovery import nodal_operator, recover_block
+from softehl.runtime.results.point_values import point_values
+from softehl.runtime.results.reactions import motion_of, reactions, support_forces
+from softehl.runtime.results.recovery import nodal_fields
 from softehl.runtime.sensitivity.hessian import HessianTerm, hessian_by_key, hessian_products
 from softehl.runtime.sensitivity.input_parsing import By, components, inputs
 from softehl.runtime.sensitivity.inputs import Input, Key
@@ -227,8 +226,9 @@ class Result:
             The place lies outside the mesh or group.
         """
         if isinstance(place, str):
-            return dict(zip(*self._motion_of(place, self.x), strict=True))
-        (row,) = self._at_points(np.asarray(place, dtype=np.float64)[None], cells, block)
+            return dict(zip(*motion_of(self._global_system, place, self.x), strict=True))
+        point = np.asarray(place, dtype=np.float64)[None]
+        (row,) = point_values(self.system, self._field_data(block), point, cells)
         return row
 
     def along(
@@ -267,54 +267,15 @@ class Result:
         """
         a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
         fractions = np.linspace(0.0, 1.0, count)
-        rows = self._at_points(a + fractions[:, None] * (b - a), cells, block)
+        points = a + fractions[:, None] * (b - a)
+        rows = point_values(self.system, self._field_data(block), points, cells)
         names = [name for name in rows[0] if all(name in row for row in rows)]
         columns = {name: np.array([row[name] for row in rows]) for name in names}
         return {"s": fractions * float(np.linalg.norm(b - a)), **columns}
 
-    def _at_points(
-        self, points: Array, group: str | None, block: str | None
-    ) -> list[dict[str, float]]:
-        """Unknowns, or fields of a block, at each place (n, dim).  Raises MeshError for one
-        outside.
-        """
-        if block is None:
-            local_rows = self._unknowns_at(points, group)
-        else:
-            local_rows = interpolate_nodal(self._global_system, points, self.at_nodes(block), group)
-        rows = self.system.comm.first_not_none(local_rows)
-        for point, row in zip(points, rows, strict=True):
-            if row is None:
-                where = "the mesh" if group is None else f"the cells {group!r}"
-                raise MeshError(f"{place_text(point)} lies outside {where}")
-        return [row for row in rows if row is not None]
-
-    def _unknowns_at(self, points: Array, group: str | None) -> list[dict[str, float] | None]:
-        """Unknowns at each place (n, dim), None outside; a warning where bodies differ."""
-        mesh, interpolated = (
-            self._global_system.mesh,
-            interpolate_unknowns(self._global_system, points, group),
-        )
-        located, values = interpolated.located, interpolated.values(self.x)
-        jump = interpolated.jump(self.x)
-        if jump is not None:
-            name, pairs = jump
-            a, b = values[name][pairs]
-            point = place_text(points[located.point[pairs[0]]])
-            warn(
-                f"{name} at {point} is {a:.6g} in one cell and {b:.6g} in another, which do not "
-                f'share their nodes; the first is taken: name a group, cells="..." '
-                f"({join_names(mesh.groups)})",
-                stacklevel=4,
-            )
-        rows: list[dict[str, float] | None] = [None] * len(points)
-        for pair in located.first.tolist():
-            rows[located.point[pair]] = {
-                n: float(values[n][pair])
-                for n, defined in interpolated.defined.items()
-                if defined[pair]
-            }
-        return rows
+    def _field_data(self, block: str | None) -> Array | dict[str, Array]:
+        """All unknowns, or the fields of a block at the nodes."""
+        return self.x if block is None else self.at_nodes(block)
 
     def fields(self, block: str) -> dict[str, Array]:
         """Return the fields of a block at its quadrature points.
@@ -483,31 +444,10 @@ class Result:
             There is no such recovery, or "spr" of a distributed mesh.
         """
         self._block(block)
-        if recovery == "spr":
-            return self._recovered_by_patches(block)
-        nodes, operator = nodal_operator(self.system.blocks[block], recovery)
-        points, piece = len(self.system.mesh.points), self.system.mesh.piece
-
-        def sums(weights: Array) -> Array:
-            local_sums = np.bincount(nodes.ravel(), weights.ravel(), points).astype(np.float64)
-            return self.system.comm.sum(local_sums) if piece is None else piece.added(local_sums)
-
-        count = sums(np.ones(nodes.shape))
-        return {
-            name: np.where(count > 0, sums(values @ operator.T) / np.maximum(count, 1), np.nan)
-            for name, values in self._local_fields(block).items()
-        }
-
-    def _recovered_by_patches(self, block: str) -> dict[str, Array]:
-        if self.system.mesh.piece is not None:
+        if recovery == "spr" and self.system.mesh.piece is not None:
             raise StudyError('recovery = "spr" needs the whole mesh, and this one is distributed')
-        fields = self.fields(block)
-        if not fields:
-            return {}
-        everywhere = self._global_system
-        values = np.stack(list(fields.values()), axis=2)
-        nodal = recover_block(everywhere.blocks[block], everywhere.mesh.points, values)
-        return {name: nodal[:, k] for k, name in enumerate(fields)}
+        fields = self.fields(block) if recovery == "spr" else self._local_fields(block)
+        return nodal_fields(self.system, block, fields, recovery)
 
     @cached_property
     def _forces(self) -> Array:
@@ -515,10 +455,7 @@ class Result:
 
         They are zero to rounding where there are none.
         """
-        x, assembler = self.point.solution.x, self.problem.assembler
-        holding = [b.name for b in assembler.blocks if isinstance(b.kernel, Spring | Tie)]
-        other_parameters = {n: v for n, v in self.problem.parameters.items() if n not in holding}
-        local_forces = assembler.residual(x, other_parameters)
+        local_forces = support_forces(self.problem, self.point.solution.x)
         return self.system.comm.gather_forces(local_forces)
 
     @property
@@ -544,38 +481,7 @@ class Result:
         MeshError
             There is no such side.
         """
-        if isinstance(where, str) and where in self._rigids:
-            components, forces = self._motion_of(where, self._forces)
-            if len(components) == 6 and self._rigids[where].finite:
-                theta = np.array(self._motion_of(where, self.x)[1][3:])
-                moment = np.linalg.lstsq(spin_by_rotation(theta).T, np.array(forces[3:]))[0]
-                forces = [*forces[:3], *moment.tolist()]
-            return dict(zip(components, forces, strict=True))
-        mesh = self.system.mesh
-        if isinstance(where, str) or callable(where):
-            nodes = mesh.nodes(where)
-        else:
-            nodes = mesh.nodes_at(np.asarray(where, dtype=np.float64))
-        sums = {}
-        for name, numbers in self._global_system.numbering.nodal.items():
-            dofs = numbers[nodes]
-            sums[name] = self.system.comm.sum_at(self._forces, dofs[dofs >= 0])
-        return sums
-
-    @property
-    def _rigids(self) -> Mapping[str, RigidBody]:
-        definition = self._global_system.definition
-        return {} if definition is None else definition.rigids
-
-    def _motion_of(self, name: str, values: Array) -> tuple[tuple[str, ...], list[float]]:
-        """Components of the motion of a rigid body and its entries of values (n,)."""
-        if name not in self._rigids:
-            raise UnknownNameError(
-                f"no rigid body {name!r}; there are {join_names(self._rigids) or 'none'}"
-            )
-        body, nodal = self._rigids[name], self._global_system.numbering.nodal
-        numbers = [nodal[body.unknown(c)][body.node] for c in body.components]
-        return body.components, [float(values[number]) for number in numbers]
+        return reactions(self.system, self._forces, where, self.x)
 
     @cached_property
     def unstable(self) -> int | None:
@@ -866,51 +772,22 @@ class Result:
         Fields are named BLOCK.FIELD, at nodes as by `at_nodes` and in cells as means. Unknowns u_x,
         u_y, u_z are also written as a vector u. The file is complete at any moment.
         """
-        context, target, share = f"write({str(path)!r})", Path(path), self.system.comm
-        if target.suffix not in (".vtu", ".pvtu"):
-            raise StudyError(f"{context}: results are written as .vtu or .pvtu")
-        if target.suffix == ".vtu" and self.system.mesh.piece is not None:
-            raise StudyError(f"{context}: of a mesh in parts results are .pvtu")
-        writable(context, target)
-        if target.suffix == ".pvtu":
-            pieces = piece_names(target, share.rank_and_size[1])
-            piece = self._picture(self.system, self._local_cells(), self.point.solution.x).compact()
-            piece.write(target.with_name(pieces[share.rank_and_size[0]]))
-            share.barrier()
-            if share.is_root:
-                piece.write_index(target, pieces)
+        if (target := write_target(path, self.system)).suffix == ".vtu":
+            write_file(target, self.system, self._picture(self._global_system, self.x))
         else:
-            picture = self._picture(self._global_system, self.system.mesh.cells, self.x)
-            if share.is_root:
-                picture.write(target)
-        share.barrier()
+            write_pieces(target, self.system, self._picture(self.system, self.point.solution.x))
 
-    def _picture(self, system: System, cells: Mapping[str, Integers], x: Array) -> VtuFields:
+    def _picture(self, system: System, x: Array) -> VtuFields:
         """Of all unknowns x, or of those of this process with its own fields."""
         nodal = at_every_node(system, x)
         for name, block in self._global_system.blocks.items():
             if block.kernel.fields and CELLS[block.kind].dimension:
                 nodal |= {f"{name}.{label}": v for label, v in self.at_nodes(name).items()}
-        fields = self.fields if system is self._global_system else self._local_fields
+        if system is self._global_system:
+            cells, fields = system.mesh.cells, self.fields
+        else:
+            cells, fields = local_cells(system), self._local_fields
         return VtuFields.of(system.mesh.points, cells, nodal, system.blocks, fields)
-
-    def _local_cells(self) -> dict[str, Integers]:
-        """Cells of the elements of this process; on process 0 also those that have no elements."""
-        mesh, blocks = self.system.mesh, self._global_system.blocks.values()
-        if mesh.piece is not None:
-            return dict(mesh.cells)
-        local_cells = {}
-        for kind, cells in mesh.cells.items():
-            block_nodes = [b.nodes for b in self.system.blocks.values() if b.kind == kind]
-            if self.system.comm.is_root:
-                with_elements = {
-                    tuple(row) for b in blocks if b.kind == kind for row in b.nodes.tolist()
-                }
-                block_nodes.append(
-                    cells[[tuple(row) not in with_elements for row in cells.tolist()]]
-                )
-            local_cells[kind] = np.unique(np.concatenate([cells[:0], *block_nodes]), axis=0)
-        return local_cells
 
 
 class ModeShape(Result):
