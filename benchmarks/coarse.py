@@ -1,11 +1,13 @@
-"""Set-up of a Newton step of `linear="matrix-free"`: the matrix of the next order, the diagonal.
+"""Cost of the coarse matrix and the diagonal, which `linear="matrix-free"` sets up in each step.
 
     python -m benchmarks.coarse [ORDER ...] [--unknowns N]
 
-Neo-Hooke on a distorted cube of hexahedra, one thread, the least of many: from the tangents of the
-elements, which are projected, and from the moduli at the points. Beside them the
-largest memory that NumPy holds meanwhile, without what is kept for the products, and the greatest
-difference of both matrices, relative to the largest entry.
+The body is neo-Hookean: a distorted cube of hexahedra, on one thread. Two routes are compared:
+tangents of the elements are computed and projected, or both follow from the moduli at the points.
+
+Printed for each route: the shortest of several times, and the largest memory of NumPy meanwhile
+(without the data of the products). Printed for both: the largest difference of their matrices,
+relative to the largest entry.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
-"""The kernel contract: what every pointer of a generated function is.
+"""Arguments of generated functions: shape and meaning of each pointer.
 
-Every kernel of a family `NAME` is a function `softehl_NAME_TASK` of one type,
+A family `NAME` has one function for each task, `softehl_NAME_TASK`. All have the same type:
 
     void f(ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
            const double *coordinates, const double *dofs, const double *data,
            const double *parameters, const double *direction,
            const double *rule, const double *basis, double *values, double *tangent);
 
-that handles `n` elements one after another.  Arrays are contiguous, row-major, of doubles, and do
-not overlap.  Units are those of the model's model (mm, MPa, N, s in the shipped ones).
+A call handles `n` elements.  Arrays are contiguous, row-major, of doubles, and do not overlap.
+Units are those of the model (mm, MPa, N, s in the shipped ones).
 
 | argument      | shape                | meaning                                                  |
 |---------------|----------------------|----------------------------------------------------------|
@@ -59,29 +59,31 @@ not overlap.  Units are those of the model's model (mm, MPa, N, s in the shipped
 |               | rates, the adjoints of the history and the rates of these  |
 
 Run-time arrays (`Definition.arrays`: curves, weights of networks) are the same for all elements of
-a call, and stand in `parameters` behind the constants: first three numbers for each, its place in
-`parameters`, its length, and the place of its rate or 0; then the arrays, and the rates of those
-that move. Tasks `pseudo_load` and `fields_rate` follow these rates too, of their `direction`
-nothing changes. The other tasks do not read rates.
-History of terms (`Definition.term_history`, one number for each entry of a run-time array) stands
-in `data` behind the other data of a point, variable by variable; where point data have rates, its
-own follow theirs. `fields` and `fields_rate` end with the new values, in the same order.
+a call. They stand in `parameters`, behind the constants. First come three numbers for each array:
+its position in `parameters`, its length, and the position of its rate (0: it does not vary). Then
+come the arrays, and the rates of those that vary. The tasks `pseudo_load` and `fields_rate` read
+these rates; their `direction` has no entries for them. The other tasks do not read rates.
+
+History of terms (`Definition.term_history`) has one number for each entry of a run-time array. It
+stands in `data`, behind the other data of a point, variable by variable. Where point data have
+rates, those of the history of terms follow them. `fields` and `fields_rate` end with the new
+values, in the same order.
 
 Pointers that a family does not use (no data, no basis, no parameters, no tangent) may be NULL.
-A kernel keeps no state, allocates nothing, reports nothing: a value outside the model's domain
-comes out as not-a-number.  An element in which a local iteration (`Model.implicit`) finds no
-solution, or in which a function of stretches meets a matrix that is not positive definite, is
-not-a-number in *every* entry of its `values` and `tangent`; the other elements are not touched.
+A kernel keeps no state, allocates nothing and reports nothing.  A value outside the domain of the
+model is not-a-number.  *All* entries of `values` and `tangent` of an element are not-a-number if a
+local iteration (`Model.implicit`) finds no solution, or if a function of stretches gets a matrix
+that is not positive definite.  Other elements are not affected.
 
 Targets
 -------
-`simd` (the default): the functions above, several elements at once, one a lane of a vector: eight
-with AVX-512, else four.  If a batch is no multiple of the lanes, its last elements are computed and
-written twice.  A kernel of an interpolated field keeps 8 (ndof + ndof^2) bytes a lane on the stack;
-so does the tangent of a weak form that is compiled as loops around a point, besides the moduli
-of its points.  Such a family has its rule written into it, and calls
-`void softehl_pairs_CELL_DIGEST`, which makes tangents of moduli and stands in a file of its own,
-the same for all models with the same fields.  The lanes are the vector extensions of gcc >= 12 and
+`simd` (the default): the functions above.  Each lane of a vector has one element: eight lanes with
+AVX-512, else four.  If `n` is no multiple of the lanes, the last elements are computed and written
+twice.  A kernel of an interpolated field keeps 8 (ndof + ndof^2) bytes a lane on the stack.  So
+does the tangent of a weak form that is compiled as loops around a point, and it also keeps the
+moduli of its points.  Such a family contains its rule.  It calls `void softehl_pairs_CELL_DIGEST`,
+which computes tangents from moduli; this function has a file of its own, the same for all models
+with the same fields.  The lanes are the vector extensions of gcc >= 12 and
 clang; another compiler, or `-DSOFTEHL_LANES=1`, gets groups of one element from the same source.
 `scalar`: the same text with one lane: one element after another, plain C11.
 `ufcx`: one cell at a time for DOLFINx custom kernels.  The tasks `energy`, `residual`, `tangent`,
@@ -104,9 +106,9 @@ clang; another compiler, or `-DSOFTEHL_LANES=1`, gets groups of one element from
 | `quadrature_permutation` |                    | not read, may be NULL                          |
 | `custom_data`            |                    | not read, may be NULL                          |
 
-Vertices, and with them the nodal unknowns in `w` and the rows and columns of `A`, stand in the
-order of DOLFINx (basix): `VERTEX_ORDER` says which node of its Lagrange element each node of the
-model is; a model with other nodes is refused.  A quadrilateral runs around in a model and in
+Vertices are in the order of DOLFINx (basix), and so are the nodal unknowns in `w` and the rows and
+columns of `A`.  `VERTEX_ORDER` maps each node of the model to a node of the Lagrange element of
+DOLFINx; a model with other nodes is refused.  A quadrilateral runs around in a model and in
 tensor-product order in DOLFINx.  Quadratic elements need a mesh whose geometry is quadratic, too.
 The components of one node stay neighbours, as in a blocked element; unknowns that belong to no
 node follow.

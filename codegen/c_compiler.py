@@ -76,7 +76,7 @@ def is_zig(command: Sequence[str]) -> bool:
 
 
 def note() -> str:
-    """What is said of the compiler where a build is reported: empty for one of the system."""
+    """Note on the compiler in the report of a build; empty for a compiler of the system."""
     return " with the compiler of the package ziglang" if is_zig(compiler()) else ""
 
 

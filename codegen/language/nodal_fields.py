@@ -76,7 +76,7 @@ class NodalFields(Fields):
     def _parent(self, order: int) -> tuple[list[Any], list[tuple[Any, ...]]]:
         """Shape functions of an order and their gradients by the parent coordinates.
 
-        Those of high order are products of names, or SymPy would need minutes for them.
+        Shape functions of high order are products of names: without them SymPy needs minutes.
         """
         cell = self._element(order)
         if cell.lines is None:

@@ -59,7 +59,7 @@ class Bifurcation:
 
     @property
     def reversed(self) -> Bifurcation:
-        """The same state with the opposite direction of the other branch."""
+        """Bifurcation with the opposite direction of the other branch, at this state."""
         return replace(self, mode=ModeShape.of(self.state, -self.mode.x))
 
 

@@ -179,7 +179,7 @@ class Forces:
     """Forces on all unknowns, (n,) each: of loads, of what has an energy, of other pages, of ties
     and of contacts. conditions: the equations of the multipliers of contacts, zero elsewhere.
 
-    Where they are spread over processes, what the elements of this one add.
+    On several processes: the contribution of the elements of this one.
     """
 
     loads: Array

@@ -1,7 +1,8 @@
 """Contact of a deformable side with the surface of a rigid body: its elements and their kernel.
 
 The law of a point is the page `rigid_touch_2` or `rigid_touch_3`. The points are those of a rule on
-the faces of the side. What the surface is next to each of them is found at each iterate.
+the faces of the side. The nearest part of the surface is
+searched at each iterate.
 """
 
 from __future__ import annotations

@@ -33,8 +33,8 @@ class SymmetricTangent:
     def at(cls, system: System, distributed: Any, x: Array, context: str) -> SymmetricTangent:
         """Raises StudyError where it is not finite or not symmetric.
 
-        That of a contact without friction is symmetric but for the error of its mesh, which changes
-        eigenvalues in the second order.
+        The tangent of a contact without friction is unsymmetric by the error of its mesh only; that
+        changes eigenvalues in the second order.
         """
         comm = system.comm
         problem = comm.local_problem(distributed).at(x)

@@ -29,10 +29,10 @@ class Table:
         Values.
     interpolation : str, optional
         "linear"; "pchip": monotone cubic (Fritsch and Butland 1984), C1, without overshoots;
-        "spline": cubic with continuous second derivatives. That of the page if left out.
+        "spline": cubic with continuous second derivatives. Default: that of the page.
     outside : str, optional
         Before the first point and behind the last: "constant", "linear" (the tangent there) or
-        "error": no value. That of the page if left out.
+        "error": no value. Default: that of the page.
     ends : str
         Of a spline: "not-a-knot" (one cubic over the first two intervals, and the last two) or
         "natural" (no curvature).

@@ -583,7 +583,7 @@ class Mesh:
         Returns
         -------
         mapping of str to array (m, k)
-            Kind of face -> node numbers. Those of the boundary are oriented as seen from outside,
+            Kind of face -> node numbers. Faces of the boundary are oriented as seen from outside,
             others as they were given.
 
         Raises

@@ -96,8 +96,8 @@ def unconstrained_unknown(K: SparseMatrix, factors: Factors) -> int | None:
     """The unknown that moves most where K, (n, n), is singular but for rounding, else None.
 
     For K y = b, changes of the entries of K by max |b| / (|K| |y|), relative to each, make K
-    singular (Oettli and Prager). What hardly moves with y, prescribed unknowns above all, is left
-    at rest.
+    singular (Oettli and Prager). Unknowns that hardly move with y
+    stay at rest, prescribed ones above all.
     """
     try:
         y = factors.solve(random_signs(K.shape[0]))

@@ -1,14 +1,16 @@
 """Theory of the inlet: h* from the edge of the dry contact alone (docs/method.md).
 
-Near an edge the dry pressure is p = K sqrt(s)(1 + b s), and the gap beyond it (4/3)(K / E*) d^1.5
-of a half-space with the modulus E*. Viscous and elastic forces balance over the length l. In the
-scales l, K sqrt(l), K l^1.5 / E* one problem is left, with a pressure P(X) and a film H(X):
+Near an edge the dry pressure is p = K sqrt(s)(1 + b s) at the distance s inside. The gap at the
+distance d outside is (4/3)(K / E*) d^1.5, that of a half-space with the modulus E*. Viscous and
+elastic forces balance over the length l. With l as unit of length, K sqrt(l) of pressure and
+K l^1.5 / E* of film thickness, the pressure P(X) and the film H(X) satisfy
 
     H' = -(2/pi) PV int P(S) / (X - S) dS,    P' = -exp(A P) (H - H*) / H^3,
 
-P -> sqrt(-X)(1 + B X) inside, with A = alpha K sqrt(l) and B = b l. It has a solution for one H*
-(Snoeijer, Eggers, Venner: Phys. Fluids 25, 101705, 2013). `local_inlet` solves it. An oil that
-thins under shear leaves one parameter more, its critical stress over eta U / (K l^1.5 / E*).
+with P -> sqrt(-X)(1 + B X) far inside, A = alpha K sqrt(l) and B = b l. There is a solution for
+one value of H* only (Snoeijer, Eggers, Venner: Phys. Fluids 25, 101705, 2013); `local_inlet`
+computes it. An oil that thins under shear adds one parameter: its critical stress, relative to
+eta U / (K l^1.5 / E*).
 """
 
 from __future__ import annotations

@@ -152,7 +152,7 @@ def normals(outline: Outline, s: Array, over: Array | float) -> Array:
 def ball_radii(outline: Outline, side: float) -> Array:
     """Radii (stations,) of the largest balls that touch the outline: inside (1) or outside (-1).
 
-    What lies within two strips along the outline does not count: corners stay blunt. Kept for the
+    Points within two strips along the outline do not count: corners stay blunt. Kept for the
     next mesh of the same outline, and not to be written into.
     """
     s = np.arange(_STATIONS) * outline.length / _STATIONS
