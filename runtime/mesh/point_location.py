@@ -117,7 +117,7 @@ class PointLocator:
         if len(outside):  # no cell is further than the next node
             reach = np.asarray(self._nodes.query(queries[outside])[0])
             more, further = self._pairs(queries[outside], reach)
-            pairs += [(number, outside[point], *rest) for number, point, *rest in more]
+            pairs += [(kind, outside[point], row, parent) for kind, point, row, parent in more]
             distances += further
         kind_of, point, row, parent = (np.concatenate(part) for part in zip(*pairs, strict=True))
         order = np.lexsort((row, kind_of, np.concatenate(distances), point))
