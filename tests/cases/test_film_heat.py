@@ -25,7 +25,7 @@ from softehl.cases.seal.equations.inlet_theory import (
     local_inlet,
     newtonian_inlet,
 )
-from softehl.cases.seal.gland.oils import read_oil, relative_viscosity
+from softehl.cases.seal.gland.oils import density, read_oil
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.driver import run
 from softehl.cases.seal.states.state import FilmState, Silent
@@ -132,11 +132,14 @@ def test_the_mean_of_an_inlet_gives_the_h_of_an_uneven_viscosity() -> None:
 
 
 def test_viscosity_of_a_warm_oil_is_that_of_its_line() -> None:
-    law = relative_viscosity("ISO VG 46", 40.0, None)
-    kinematic = read_oil("ISO VG 46")
-    assert law(np.array([0.0, 20.0])) == pytest.approx(
-        [1.0, kinematic(60.0) / kinematic(40.0) * (870.0 - 0.65 * 45.0) / (870.0 - 0.65 * 25.0)]
-    )
+    p, kinematic = Seal(heating=True, oil="ISO VG 46", temperature=40.0), read_oil("ISO VG 46")
+    line = [kinematic(40.0 + t) * density(40.0 + t) for t in (0.0, 10.0, 30.0)]
+    ratios = p.warm_viscosity(np.array([0.0, 10.0, 30.0]))
+    assert ratios[:2] == pytest.approx(np.array(line[:2]) / line[0], rel=3e-3)
+    assert ratios[2] == pytest.approx(line[2] / line[0], rel=0.02)
+    settled = Seal(**p.settled())  # as a study of random numbers has it
+    assert settled.oil is None
+    assert settled.warm_viscosity(np.array([10.0]))[0] == pytest.approx(ratios[1], rel=1e-12)
 
 
 def solved(**keys: Any) -> FilmState:
@@ -161,11 +164,16 @@ def test_a_warm_film_is_thinner_and_its_heat_is_its_friction() -> None:
     assert 0.0 < warm.inlet_heating_K < warm.film_heating_K < 10.0
 
 
-def test_a_slow_film_keeps_its_cold_digits() -> None:
+def test_a_slow_film_and_an_oil_without_slope_keep_their_cold_digits() -> None:
     cold, warm = solved(speeds=(1.0,)), solved(speeds=(1.0,), heating=True)
     assert warm.h_star_um == cold.h_star_um
     assert warm.rod_friction_N == pytest.approx(cold.rod_friction_N, rel=1e-4)
     assert warm.film_heating_K < 1e-3
+    fast = {"speeds": (3000.0,), "oil": None, "temperature": None}
+    cold, warm = solved(**fast), solved(**fast, heating=True, viscosity_slope=0.0)
+    numbers = ((s.h_star_um, s.rod_friction_N, s.h_star_theory_um, s.density) for s in (cold, warm))
+    assert next(numbers) == next(numbers)
+    assert warm.film_heating_K > 1.0
 
 
 def test_heating_needs_its_oil_and_a_steady_state() -> None:

@@ -46,6 +46,13 @@ def row(speed: float, film: float, verdict: str = OK, sealed_pressure: float = 1
 # --- The answer of a run in words, reports of cycles, titles, and text in sheets ------------------
 
 
+def test_a_warm_film_is_in_the_line_of_its_speed() -> None:
+    warm = replace(row(400.0, 1.4), film_heating_K=0.621, heat_to_rod_W=7.28)
+    lines = run_summary([warm, row(-400.0, 1.1)], travel=100.0)
+    assert lines[1].endswith("; warms the film by 0.62 K and the rod with 7.28 W")
+    assert "warms" not in run_summary([row(400.0, 1.4), row(-400.0, 1.1)], travel=100.0)[1]
+
+
 @pytest.mark.parametrize(
     ("rows", "head", "said"),
     [

@@ -101,7 +101,7 @@ HARDEST = 8.0
 
 _NEEDS: Mapping[str, tuple[Callable[[Seal], Any], str]] = {
     "temperature": (
-        lambda p: p.oil or p.fit or p.modulus_table or _by_temperature(p),
+        lambda p: p.oil or p.fit or p.modulus_table or p.heating or _by_temperature(p),
         "an oil, a fit, or a rubber by its hardness in the cold",
     ),
     "glass_transition": (lambda p: p.shore_A is not None, "a hardness"),
@@ -111,6 +111,7 @@ _NEEDS: Mapping[str, tuple[Callable[[Seal], Any], str]] = {
     "cavitation_penalty": (lambda p: not p.conserving, 'cavitation = "penalty"'),
     "asperity_stiffness": (lambda p: p.rough, "a roughness"),
     "boundary_friction": (lambda p: p.rough, "a roughness"),
+    "viscosity_slope": (lambda p: p.heating, "heating = true"),
 }
 """Key -> whether it has an effect, and what it has none without."""
 
@@ -151,8 +152,8 @@ def _unusual(p: Seal) -> Iterator[str]:
         yield from _not_resistant(p, oil.family)
     if "speeds" in type(p).model_fields and max(p.speeds) > FASTEST:
         yield (
-            f"a speed of {max(p.speeds):g} mm/s: reciprocating seals are used to {FASTEST:g} mm/s, "
-            "and the heat of the film is left out"
+            f"a speed of {max(p.speeds):g} mm/s: reciprocating seals are used to {FASTEST:g} mm/s"
+            f"{'' if p.heating else ', and the heat of the film is left out'}"
         )
     yield from _of_series(p)
     yield from _cold(p)

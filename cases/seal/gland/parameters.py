@@ -111,9 +111,9 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
     @property
     def warm_viscosity(self) -> Viscosity:
         """Viscosity by the rise of the temperature, over that of the cold oil, with heating."""
-        assert self.oil is not None
-        assert self.temperature is not None
-        return relative_viscosity(self.oil, self.temperature, self.oil_density)
+        assert self.viscosity_slope is not None
+        usual = 40.0 if self.temperature is None else self.temperature
+        return relative_viscosity(self.viscosity_slope, usual)
 
     @property
     def predictable(self) -> bool:

@@ -190,6 +190,14 @@ class Oil(ThinningKeys):
         ge=0,
         le=2,
     )
+    viscosity_slope: float | None = key(
+        None,
+        "fall of ln eta_0 for a degree at the temperature (40 degC if left out), for heating",
+        unit="1/K",
+        bounds="0 to 0.5, 0.03 to 0.08 is usual, left out = that of the oil",
+        ge=0,
+        le=0.5,
+    )
     oil_density: float | None = key(
         None,
         "density of the oil at 15 degC",
@@ -373,7 +381,7 @@ class FilmModel(FreeSeal, Surfaces):
     )
     shear_traction: bool = key(True, "whether the shear stress of the film acts on the seal")
     heating: bool = key(
-        False, "whether friction warms the film, in steady state; needs an oil and its temperature"
+        False, "whether friction warms the film, in steady state; needs an oil, or viscosity_slope"
     )
     arc_start: float | None = key(
         None,

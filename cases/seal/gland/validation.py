@@ -100,10 +100,10 @@ def _heating_has_its_oil(p: Seal) -> None:
             "heating = true with sensitivity = true: sensitivities are those of a film of one "
             "temperature; leave one of them out"
         )
-    if p.oil is None or p.temperature is None:
+    if p.viscosity_slope is None:
         raise ValueError(
             "heating = true needs the viscosity of the oil over temperature: give an oil and its "
-            'temperature, as in oil = "ISO VG 46" and temperature = "40 degC"'
+            'temperature, as in oil = "ISO VG 46" and temperature = "40 degC", or viscosity_slope'
         )
 
 

@@ -102,7 +102,7 @@ def _whether(speeds: Sequence[_Speed], travel: float) -> str:
 def _line(speed: _Speed, travel: float, stroke: str, service: str | None) -> str:
     """A speed: leakage, friction, least lambda."""
     strokes = speed.strokes
-    parts = [f"friction {_forces(strokes)}", *_ratio(strokes)]
+    parts = [f"friction {_forces(strokes)}", *_ratio(strokes), *_warmth(strokes)]
     if speed.net is not None or stroke == "both":
         parts.insert(0, _leakage(speed, travel, service))
     verdicts = {f"{stroke}stroke": row.verdict for stroke, row in strokes.items()}
@@ -152,6 +152,15 @@ def _ratio(strokes: Mapping[str, FilmRow]) -> Iterator[str]:
     if rough:
         stroke, row = min(rough.items(), key=lambda item: item[1].lambda_ratio)
         yield f"least lambda {row.lambda_ratio:.3g} ({row.regime}, {stroke}stroke)"
+
+
+def _warmth(strokes: Mapping[str, FilmRow]) -> Iterator[str]:
+    """How warm friction makes the film, and the heat into the rod, of the warmest stroke."""
+    warm = [row for row in strokes.values() if row.film_heating_K > 0.0]
+    if warm:
+        row = max(warm, key=lambda row: row.film_heating_K)
+        rise, power = row.film_heating_K, row.heat_to_rod_W
+        yield f"warms the film by {rise:.2g} K and the rod with {power:.3g} W"
 
 
 def _thin(strokes: Mapping[str, FilmRow]) -> str:
