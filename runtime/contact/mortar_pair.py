@@ -96,15 +96,15 @@ class MortarPairKernel:
         parts = [*(point.vectors[v] for v in ("apart", "slope_a", "slope_b", "came")), (tau, dtau)]
         z, dz = (np.concatenate([p[i] for p in parts], axis=1) for i in (0, 1))
         limits = data[:, width : width + 4]
-        arrays = np.empty((n, 0)), np.ascontiguousarray(z)
+        none, unknowns = np.empty((n, 0)), np.ascontiguousarray(z)
         arguments = {"data": np.ascontiguousarray(limits), "parameters": np.empty(0)}
         node_weights = _opposite(point.first, point.second)
         W, dW = point.weight
         rows = [0, 1, 2, 12, 13, 14, 15]
         if K is None:
-            f = W[:, None] * self.law.residual(*arrays, **arguments)[:, rows]
+            f = W[:, None] * self.law.residual(none, unknowns, **arguments)[:, rows]
         else:
-            values, derivatives = self.law.tangent(*arrays, **arguments)
+            values, derivatives = self.law.tangent(none, unknowns, **arguments)
             df = W[:, None, None] * np.einsum("nij,njm->nim", derivatives[:, rows], dz)
             df += values[:, rows, None] * dW[:, None]
             f = W[:, None] * values[:, rows]

@@ -124,8 +124,12 @@ class PairLawKernel:
         R, law = np.zeros(dofs.shape), self.differentiated()
         for point in self._points(coordinates, dofs, arguments["data"], columns=0):
             rows, z, _ = self._inputs(point, dofs, arguments["data"])
-            arrays = np.empty((len(rows), 0)), z, np.ascontiguousarray(direction[rows])
-            f = law.pseudo_load(*arrays, parameters=arguments["parameters"])
+            f = law.pseudo_load(
+                np.empty((len(rows), 0)),
+                z,
+                np.ascontiguousarray(direction[rows]),
+                parameters=arguments["parameters"],
+            )
             for row, sign, columns, (S, _) in self._tests(point):
                 share = sign * point.weight[0][rows] * f[:, row]
                 R[np.ix_(rows, columns)] += share[:, None] * S[rows]
@@ -166,16 +170,16 @@ class PairLawKernel:
         shape = (n, width // self.dimension, self.dimension)
         X = coordinates.reshape(shape)
         now = dofs[:, :width].reshape(shape) if self.moves else 0.0
-        nodes = X, X + now, X + data[:, :width].reshape(shape)
+        x, previous = X + now, X + data[:, :width].reshape(shape)
         varied = self.moves and columns > 0
         if self.dimension == 2:
             yield from LineGeometry(
-                self.one, self.other, *nodes, columns, varied, self.ring
+                self.one, self.other, X, x, previous, columns, varied, self.ring
             ).points()
         else:
             corners = data[:, -3 * CORNER :].reshape(n, 3, CORNER)
             yield from FaceGeometry(
-                self.one, self.other, *nodes, corners, columns, varied, self.order
+                self.one, self.other, X, x, previous, corners, columns, varied, self.order
             ).points()
 
     def _inputs(self, point: PairPoint, dofs: Array, data: Array) -> tuple[Integers, Array, Array]:

@@ -291,9 +291,9 @@ def _everywhere(
     y: Array, flat: float, side: float, radius: float, centre: Array, axis: Array
 ) -> Nearest:
     """One simple surface for all points (n, dim)."""
-    numbers = [np.full(len(y), v) for v in (flat, side, radius)]
-    vectors = [np.broadcast_to(v, y.shape) for v in (centre, axis)]
-    return Nearest(y, *numbers, *vectors)
+    flats, sides, radii = (np.full(len(y), v) for v in (flat, side, radius))
+    centres, axes = (np.broadcast_to(v, y.shape) for v in (centre, axis))
+    return Nearest(y, flats, sides, radii, centres, axes)
 
 
 def _vector(kind: str, name: str, value: Any) -> Array:

@@ -161,7 +161,8 @@ def _law(
 ) -> LawRequest:
     """The kernel of a law on pairs, and its parameters.  Raises StudyError."""
     cell, geometry = _PAIRS[definition.mesh.dimension]
-    origin = KernelOrigin(*source, geometry, law=False)
+    page, name = source
+    origin = KernelOrigin(page, name, geometry, law=False)
     kernel = origin.loaded(cell)
     if kernel.cell != cell:
         raise StudyError(

@@ -351,12 +351,24 @@ class MatrixFreeOperator:
     def _iterated(self, b: Array) -> Array:
         """z of T' K T z = b, node by node; zero for constrained unknowns."""
         settings, space = self.iteration, self.backend.space(self)
-        cycle, limits = self._multigrid(space), (settings.tolerance, settings.max_iterations)
+        cycle = self._multigrid(space)
         if self._is_symmetric(space):
-            result = conjugate_gradients(space.apply, cycle, space.vector(b), *limits)
+            result = conjugate_gradients(
+                space.apply,
+                cycle,
+                space.vector(b),
+                tolerance=settings.tolerance,
+                max_iterations=settings.max_iterations,
+            )
         else:  # by SciPy, with vectors of the host
             apply, precondition = (_on_host(space, action) for action in (space.apply, cycle))
-            result = minimal_residuals(apply, precondition, b, *limits)
+            result = minimal_residuals(
+                apply,
+                precondition,
+                b,
+                tolerance=settings.tolerance,
+                max_iterations=settings.max_iterations,
+            )
         settings.counts.append(result.iterations)
         # up to a negative curvature it is a direction of descent, which Newton's method may take
         x = space.host(result.x)

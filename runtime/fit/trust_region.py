@@ -46,7 +46,8 @@ def minimise(
     a point whose value was the latest or an earlier one. tolerance: length of a step after which
     the next one would be its square. more: whether another evaluation is allowed.
     """
-    y, radius, (lower, upper) = np.clip(start, *bounds), _START, bounds
+    lower, upper = bounds
+    y, radius = np.clip(start, lower, upper), _START
     f, (g, H) = value(y), derivatives(y)
     while True:
         free = ~(((y <= lower) & (g > 0.0)) | ((y >= upper) & (g < 0.0)))

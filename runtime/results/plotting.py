@@ -215,8 +215,8 @@ def plot_path(
     chart.line(values, np.array([r.t for r in results]), width=2.0)
     if limits:
         dof = system.numbering.nodal[name][node]
-        limit_points = [limit.x[dof] for limit in limits], [limit.t for limit in limits]
-        chart.scatter(*limit_points, color="r", size=8, label="limit points")
+        x, y = [limit.x[dof] for limit in limits], [limit.t for limit in limits]
+        chart.scatter(x, y, color="r", size=8, label="limit points")
     plotter = new_plotter(off_screen=file is not None)
     plotter.add_chart(chart)
     show_or_save(plotter, file)

@@ -70,11 +70,11 @@ class ElementCurvatures:
             of_points = (along.history, adjoint.history, adjoint_rate.history)
             values = [none if v is None else v for v in of_points]
             arguments["point_data"] = np.concatenate([block.point_data, *values], axis=2)
-        call: Any = (block.coordinates, elements.dofs, np.hstack(vectors))
-        rates = kernel.adjoint_rate(*call, **arguments)
+        X, u, direction = block.coordinates, elements.dofs, np.hstack(vectors)
+        rates = kernel.adjoint_rate(X, u, direction, **arguments)
         history = None
         if block.point_data is not None:
-            history = kernel.point_adjoint_rate(*call, **arguments)
+            history = kernel.point_adjoint_rate(X, u, direction, **arguments)
         return Variation(rates[:, : elements.width], rates[:, elements.width :], history)
 
     def _kernel(self) -> Kernel:

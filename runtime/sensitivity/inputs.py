@@ -543,8 +543,8 @@ class NodeCoordinates:
             factor = sum(m.seed[0] for m in others if _supports(m.item, c))
             rates = factor * slope(_values(c, tape, axes), span / float(np.abs(axes).max()))
             if dX.any():
-                units = axes / np.abs(axes).max(), dX / np.abs(dX).max()
-                bend = mixed(_values(c, tape, *units), span)
+                unit_axes, unit_move = axes / np.abs(axes).max(), dX / np.abs(dX).max()
+                bend = mixed(_values(c, tape, unit_axes, unit_move), span)
                 rates = rates + np.abs(axes).max() * np.abs(dX).max() * bend
             curvatures.append(PrescribedSeeds(dofs[mask], self.targets[c.nodes[mask]], rates[mask]))
         return curvatures

@@ -140,7 +140,7 @@ class Factorisation:
         if correction > self.settled * float(np.abs(x).max(initial=0.0)):
             raise SingularMatrix("the linear solution does not settle: the matrix is singular")
         pairs = [(x, b)] if b.ndim == 1 else zip(x.T, b.T, strict=True)
-        error = max(self._backward_error(*pair) for pair in pairs)
+        error = max(self._backward_error(column, right) for column, right in pairs)
         if error > self.accuracy:
             raise SingularMatrix(
                 f"the linear solution has a backward error of {error:.1e} (allowed "
