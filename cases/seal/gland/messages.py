@@ -403,6 +403,8 @@ def _fluids(p: Seal, keys_set: frozenset[str]) -> Iterator[str]:
             texts.append(f"the pressure-viscosity coefficient {p.pressure_viscosity:.3g} 1/MPa")
         if texts:
             yield f"{' and '.join(texts)}, of a mineral oil"
+    elif name and not keys_set & {"pressure_viscosity", "roelands"}:
+        yield f"the pressure-viscosity coefficient {p.pressure_viscosity:.3g} 1/MPa (to 15 %)"
     elif "viscosity" in keys_set and not keys_set & {"pressure_viscosity", "roelands"}:
         yield f"a pressure-viscosity coefficient of {p.pressure_viscosity:g} 1/MPa"
     if name and name.improved:
