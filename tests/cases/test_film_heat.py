@@ -147,6 +147,7 @@ def solved(**keys: Any) -> FilmState:
     return state
 
 
+@pytest.mark.slow
 def test_a_warm_film_is_thinner_and_its_heat_is_its_friction() -> None:
     cold, warm = solved(speeds=(3000.0,)), solved(speeds=(3000.0,), heating=True)
     assert isnan(cold.film_heating_K)
@@ -164,6 +165,7 @@ def test_a_warm_film_is_thinner_and_its_heat_is_its_friction() -> None:
     assert 0.0 < warm.inlet_heating_K < warm.film_heating_K < 10.0
 
 
+@pytest.mark.slow
 def test_a_slow_film_and_an_oil_without_slope_keep_their_cold_digits() -> None:
     cold, warm = solved(speeds=(1.0,)), solved(speeds=(1.0,), heating=True)
     assert warm.h_star_um == cold.h_star_um
