@@ -137,7 +137,8 @@ def _combined(
     a: dict[int | None, Polynomial], b: dict[int | None, Polynomial], sa: int, sb: int
 ) -> dict[int | None, Polynomial]:
     keys = [*a, *(k for k in b if k not in a)]
-    return {k: added(added({}, a.get(k, {}), sa), b.get(k, {}), sb) for k in keys}
+    scaled = a if sa > 0 else {k: added({}, p, sa) for k, p in a.items()}
+    return {k: added(scaled.get(k, {}), b.get(k, {}), sb) for k in keys}
 
 
 def _common_factors(n: Node, degree: Mapping[Node, int]) -> set[Node]:

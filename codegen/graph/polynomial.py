@@ -15,20 +15,33 @@ Polynomial = dict[Monomial, Fraction]
 
 def product(p: Polynomial, q: Polynomial) -> Polynomial:
     """Product of two polynomials."""
+    if len(q) == 1 and () in q:
+        p, q = q, p
+    if len(p) == 1 and () in p:
+        (c,) = p.values()
+        return {k: c * v for k, v in q.items() if c and v} if c != 1 else _nonzero(q)
     out: Polynomial = {}
     for a, x in p.items():
         for b, y in q.items():
             key = tuple(sorted((*a, *b)))
-            out[key] = out.get(key, Fraction(0)) + x * y
-    return {k: v for k, v in out.items() if v}
+            term = y if x == 1 else x if y == 1 else x * y
+            before = out.get(key)
+            out[key] = term if before is None else before + term
+    return _nonzero(out)
 
 
 def added(p: Polynomial, q: Polynomial, sign: int) -> Polynomial:
     """p + sign q."""
     out = dict(p)
     for k, v in q.items():
-        out[k] = out.get(k, Fraction(0)) + sign * v
-    return {k: v for k, v in out.items() if v}
+        before = out.get(k)
+        term = v if sign > 0 else -v
+        out[k] = term if before is None else before + term
+    return _nonzero(out)
+
+
+def _nonzero(p: Polynomial) -> Polynomial:
+    return {k: v for k, v in p.items() if v}
 
 
 def value(

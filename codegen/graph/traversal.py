@@ -8,6 +8,7 @@ yields its inner calls, and run by `recursion`, which keeps the stack in a list.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
+from operator import attrgetter
 from typing import Any, TypeVar
 
 from softehl.codegen.graph.graph import FREE, Graph, Node, Op
@@ -15,6 +16,7 @@ from softehl.codegen.graph.graph import FREE, Graph, Node, Op
 T = TypeVar("T")
 Recursion = Generator[Any, T, T]
 """A recursive function under way: `value = yield function(arguments)` is a call of itself."""
+_BY_ID = attrgetter("id")
 
 
 def recursion(outermost: Recursion[T]) -> T:
@@ -36,16 +38,16 @@ def recursion(outermost: Recursion[T]) -> T:
 
 def reachable(roots: Iterable[Node], stop: Callable[[Node], bool] | None = None) -> list[Node]:
     """All nodes below `roots` (operands of nodes that satisfy `stop` excluded), ids ascending."""
-    seen: dict[int, Node] = {}
-    stack = list(roots)
+    seen = set(roots)
+    stack = list(seen)
     while stack:
         n = stack.pop()
-        if n.id in seen:
-            continue
-        seen[n.id] = n
         if stop is None or not stop(n):
-            stack.extend(n.args)
-    return [seen[i] for i in sorted(seen)]
+            for a in n.args:
+                if a not in seen:
+                    seen.add(a)
+                    stack.append(a)
+    return sorted(seen, key=_BY_ID)
 
 
 def always(roots: Iterable[Node], *, conditions: bool = True) -> list[Node]:
