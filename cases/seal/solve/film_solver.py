@@ -13,7 +13,7 @@ from math import exp, inf, log
 from softehl.cases.seal.equations.film_heat import changed_film
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.equations.system import SealSystem
-from softehl.cases.seal.solve.correctors import FilmCorrectors
+from softehl.cases.seal.solve.correctors import HARD, FilmCorrectors
 from softehl.cases.seal.solve.inlet import POWER, InletScales
 from softehl.cases.seal.solve.load_stages import LoadStageLog, PathDriver
 from softehl.cases.seal.solve.squeeze_film import (
@@ -41,6 +41,10 @@ WARM = 1e-4
 
 _WARMINGS, _STEP = 12, 0.3
 """Solutions with another viscosity at most, and its largest change in one of them, of ln eta."""
+
+
+PATIENCE, SHORTER = (6, 40), 0.5
+"""Failed steps, in a row and in all, and change of a step, above HARD."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +197,11 @@ class FilmSolver:
     ) -> Film | NoFilm:
         """The film squeezed out from a moment; pressures: as of `from_film`."""
         film, log = squeeze_film.film, self._log(squeeze_film)
-        branch, reached = PseudoTransient(correctors.steps(pressures)).follow(
+        steps = PseudoTransient(correctors.steps(pressures))
+        p = self.system.parameters
+        if p.load_ratio(p.sealed_pressure) > HARD:
+            steps = replace(steps, failures=PATIENCE, target_change=SHORTER)
+        branch, reached = steps.follow(
             squeeze_film,
             start,
             on_point=lambda point: log.step(point.solution),
