@@ -497,3 +497,48 @@ AXES: dict[str, tuple[str, ...]] = {
     "analysis": tuple(ANALYSES),
 }
 """Features by axis; the first one is the default."""
+
+ALIKE: dict[str, dict[str, tuple[str, ...]]] = {
+    "cell": {
+        "quad4": (),
+        "quad8": ("quad9", "quad16", "quad25", "quad36", "quad49"),
+        "tri6": ("tri3",),
+        "hex20": ("hex8", "hex27", "hex64"),
+        "tet10": ("tet4",),
+        "wedge15": ("wedge6", "wedge18", "pyramid5"),
+    },
+    "law": {
+        "energy": ("weak form", "whole element", "loops over points", "product"),
+        "points": (),
+        "stress of a material": (
+            *("energy of a material", "neo_hooke", "ogden", "hooke", "learned", "split"),
+        ),
+        "plastic": ("softened", "local unknown"),
+        "taylor-hood": ("mixed",),
+        "condensed": ("enhanced",),
+        "unit cells": (),
+    },
+    "load": {"traction": ("tension", "force"), "pressure": (), "weight": (), "prescribed": ()},
+    "constraint": {
+        "clamped": ("sliding side",),
+        "spring": (),
+        "tied sides": (),
+        "rigid side": (),
+    },
+    "geometry": {"plane strain": (), "axisymmetric": ()},
+    "solver": {"auto": ("superlu",), "amg": (), "matrix-free": ()},
+    "analysis": {
+        "solve": ("many steps",),
+        "start": (),
+        "follow": (),
+        "bdf2": ("euler", "adaptive"),
+        "generalised-alpha": ("newmark", "midpoint"),
+        "explicit": (),
+    },
+}
+"""Axis -> feature -> others that pass through the same layer of the program as it does.
+
+Pairs of features are tried with the first of each layer. Layers: the reference cell (hexahedra,
+simplices, ...), the way of a law to its C and its state (history, unknowns of elements), dead and
+following loads, constraints by values, by rows and by bodies, linear solver, time scheme.
+"""

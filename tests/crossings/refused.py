@@ -31,7 +31,10 @@ def _rigid(at: Problem) -> bool:
     return at.constraint == "rigid side"
 
 
-REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
+Row = tuple[tuple[str, ...], Callable[[Problem], bool], str]
+"""Relations, condition, message."""
+
+REFUSED: tuple[Row, ...] = (
     ((), lambda at: at.law == "unit cells" and at.geometry == "axisymmetric", "in plane strain"),
     (("large ring",), lambda at: at.law == "unit cells", "in plane strain"),
     (
