@@ -16,6 +16,12 @@ BUILDER := $(wildcard codegen/tools/build.py codegen/abi.py)
 # a second Python, on which `make test-other` runs the tests
 OTHERS ?= python3.13 python3.12 $(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/python \
 	$(HOME)/.pyenv/versions/3.12.*/bin/python)
+# what depends on the language: public names, reading of pages, building, packages, files, commands; one
+# study and one seal. Numbers come from the same C, so the others repeat.
+OTHER_TESTS := $(wildcard tests/test_*.py) tests/packaging \
+	$(addprefix tests/codegen/test_,cache.py emit_and_build.py fields.py generated_is_current.py \
+	import_record.py mistakes.py named_symbols.py sympy_lowering.py user_models.py) \
+	tests/runtime/test_study.py tests/cases/test_cli.py tests/cases/test_driver.py
 # a Python for which PETSc comes as wheels: `make mpi` makes an environment with it
 MPI_PYTHONS ?= python3.12 $(wildcard $(HOME)/.pyenv/versions/3.12.*/bin/python) python3.13 \
 	$(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/python) $(PYTHON)
@@ -27,7 +33,7 @@ help:
 	@echo "make test     run the test suite"
 	@echo "make slow     the tests that take minutes"
 	@echo "make wheel    build the wheel, install it elsewhere and use it, with and without compiler"
-	@echo "make test-other    the test suite on a second Python, where one is installed"
+	@echo "make test-other    what depends on the language on a second Python, where one is installed"
 	@echo "make mpi      the engine petsc on 1, 2 and 3 processes, where Python >= 3.12 is installed"
 	@echo "make hosts    JAX, NGSolve and CalculiX with generated pages; CalculiX where apt-get builds it"
 	@echo "make lint     ruff and mypy; make check: lint and test"
@@ -39,7 +45,7 @@ oring: $(VENV)/.kernels
 
 # worksteal: neighbours, which share what they are tested on, stay in one process
 test: $(VENV)/.dev $(VENV)/.kernels
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(BIN)/python -m pytest -n 2 --dist worksteal $(TESTS)
 
 slow: $(VENV)/.compiler $(VENV)/.kernels
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
@@ -53,7 +59,7 @@ test-other:
 	  found=$$($$other -c 'import sys, venv, ensurepip; print(sys.version_info[:2])' 2>/dev/null); \
 	  if [ -n "$$found" ] && [ "$$found" != "$$main" ]; then \
 	    echo "the tests on $$($$other --version)"; \
-	    exec $(MAKE) test VENV=.venv-other PYTHON="$$other"; \
+	    exec $(MAKE) test VENV=.venv-other PYTHON="$$other" TESTS="$(OTHER_TESTS)"; \
 	  fi; \
 	done; \
 	echo "no second Python is installed (looked for: $(OTHERS)): its tests are left out"

@@ -98,9 +98,13 @@ def read(part: str) -> Reader:
     return reader
 
 
-@pytest.mark.parametrize(
-    "part", [pytest.param(p, marks=[pytest.mark.slow] * (p in LONG)) for p in PARTS]
-)
+def marks_of(part: str) -> list[pytest.MarkDecorator]:
+    """Of a part: whole seals take the longest."""
+    seal = part == "report" or part.startswith("first-seal")
+    return [pytest.mark.slow] * (part in LONG) + [pytest.mark.first] * seal
+
+
+@pytest.mark.parametrize("part", [pytest.param(p, marks=marks_of(p)) for p in PARTS])
 def test_a_part_runs_in_order_and_prints_what_it_shows(part: str, here: Path) -> None:
     if part == "report" or part.startswith("first-seal"):
         pytest.importorskip("bokeh", reason="the extra `report` is not installed")
