@@ -35,7 +35,30 @@ ENERGY = "energy"
 
 def integral(result: Result, text: str, where: str | None, block: str | None) -> float:
     """Integral of an expression; see `Result.integral`.  Raises StudyError, MeshError."""
+    return _integrate(result, Expression.of(text), where, block)[0]
+
+
+def mean(result: Result, text: str, where: str | None, block: str | None) -> float:
+    """Integral by the volume that it is taken over; see `Result.mean`.
+
+    Raises StudyError, MeshError.
+    """
     expression = Expression.of(text)
+    total, volume = _integrate(result, expression, where, block)
+    if np.isnan(volume):
+        raise StudyError(
+            f"mean({text!r}): {ENERGY!r} alone has no values at points: divide the integral by "
+            "that of '1', or name the energy in the page by m.define"
+        )
+    if volume == 0.0:
+        raise StudyError(f"mean({text!r}): there is no volume or area to take a mean over")
+    return total / volume
+
+
+def _integrate(
+    result: Result, expression: Expression, where: str | None, block: str | None
+) -> tuple[float, float]:
+    """Integral and volume; the volume of an energy that has no points is NaN."""
     mesh = result.system.mesh
     if mesh.piece is not None:
         raise StudyError("integral: the mesh is distributed: integrate with one process")
@@ -46,10 +69,11 @@ def integral(result: Result, text: str, where: str | None, block: str | None) ->
     nodal_names |= set(_NORMAL[: mesh.dimension]) if domain.is_side else set()
     if block is None and set(expression.names) <= nodal_names and not _on_page(result, expression):
         return _over_mesh(result, expression, domain)
-    total = 0.0
+    total = volume = 0.0
     for page in _blocks(result, expression, domain, block):
-        total += _over_block(result, expression, domain, page)
-    return total
+        part, size = _over_block(result, expression, domain, page)
+        total, volume = total + part, volume + size
+    return total, volume
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +125,9 @@ def _on_page(result: Result, expression: Expression) -> bool:
     return bool(fields & set(expression.names) - set(result.system.everywhere.numbering.nodal))
 
 
-def _over_mesh(result: Result, expression: Expression, domain: _Domain) -> float:
-    """Integral of unknowns and coordinates."""
-    system, total = result.system.everywhere, 0.0
+def _over_mesh(result: Result, expression: Expression, domain: _Domain) -> tuple[float, float]:
+    """Integral of unknowns and coordinates, and volume."""
+    system, total, volume = result.system.everywhere, 0.0, 0.0
     ring = _is_ring(system)
     for kind, nodes in domain.elements.items():
         cell = CELLS[kind]
@@ -124,24 +148,24 @@ def _over_mesh(result: Result, expression: Expression, domain: _Domain) -> float
             full = not np.isnan(nodal).any()
             shape = (cell if full else cell.linear).shape(points)
             values[name] = nodal[:, : shape.shape[1]] @ shape.T
-        total += _sum(
-            expression,
-            values,
-            _volumes(cell, system.mesh.points[nodes], points, ring=ring) * weights,
-        )
-    return total
+        volumes = _volumes(cell, system.mesh.points[nodes], points, ring=ring) * weights
+        total += _sum(expression, values, volumes)
+        volume += float(volumes.sum())
+    return total, volume
 
 
-def _over_block(result: Result, expression: Expression, domain: _Domain, block: Block) -> float:
-    """Integral over the elements of a block in a domain, by the rule of its page."""
+def _over_block(
+    result: Result, expression: Expression, domain: _Domain, block: Block
+) -> tuple[float, float]:
+    """Integral and volume of the elements of a block in a domain, by the rule of its page."""
     system = result.system.everywhere
     facet = facet_nodes(block.kernel)
     nodes = block.nodes if facet is None else block.nodes[:, facet]
     rows = domain.contains(block.kind, nodes)
     if not rows.any():
-        return 0.0
+        return 0.0, 0.0
     if expression.names == (ENERGY,) and ENERGY not in block.kernel.fields:
-        return float(_energies(result, block)[rows].sum())
+        return float(_energies(result, block)[rows].sum()), float("nan")
     rule = block.options.rule or block.kernel.default_rule
     points = IntegrationPoints.of(system.mesh, block.kernel, block.kind, nodes, rule)
     if points.shape is None:
@@ -160,7 +184,8 @@ def _over_block(result: Result, expression: Expression, domain: _Domain, block: 
         rule.table[:, :-1],
         ring=_is_ring(system),
     )
-    return _sum(expression, values, volume * rule.weights)
+    volumes = volume * rule.weights
+    return _sum(expression, values, volumes), float(volumes.sum())
 
 
 def _sum(expression: Expression, values: Mapping[str, Array | float], volume: Array) -> float:

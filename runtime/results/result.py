@@ -24,7 +24,7 @@ from softehl.runtime.kernels.explanation import Explanation
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.plotting import picture_file, show_or_save
 from softehl.runtime.results.explanation import block_called, explain_element
-from softehl.runtime.results.integrals import integral
+from softehl.runtime.results.integrals import integral, mean
 from softehl.runtime.results.output import (
     VtuFields,
     local_cells,
@@ -390,6 +390,34 @@ class Result:
         by a rule for twice the order of the cells.
         """
         return integral(self, expression, where, block)
+
+    def mean(self, expression: str, where: str | None = None, *, block: str | None = None) -> float:
+        """Return the mean of an expression over the reference body, a group or a side.
+
+        Parameters
+        ----------
+        expression : str
+            As of `integral`.
+        where : str, optional
+            Group of cells, or a side; all cells that have the names if left out.
+        block : str, optional
+            Block of the names; may be left out if the names say it.
+
+        Returns
+        -------
+        float
+            The integral divided by the volume, on sides by the area, of the elements that it is
+            taken over; in axisymmetry of whole rings.
+
+        Raises
+        ------
+        StudyError
+            As of `integral`; the elements have no volume, or "energy" stands alone, which has no
+            values at points.
+        MeshError
+            There is no such side or group.
+        """
+        return mean(self, expression, where, block)
 
     def explain(self, element: int, block: str | None = None) -> Explanation:
         """Return every named value of a page in one element, as `Kernel.explain`.

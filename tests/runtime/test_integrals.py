@@ -112,6 +112,37 @@ def test_groups_add_up_to_the_body() -> None:
         result.integral("mu", "b", block="body a")
 
 
+def test_means_are_of_volumes_and_areas() -> None:
+    """Cells of unequal size, a body of two groups, a ring, a side and its force."""
+    mesh = Mesh.rectangle(2, 1, cells=(4, 2)).map(
+        lambda x: x * np.stack([x[:, 0], 1 + 0 * x[:, 0]], 1)
+    )
+    mesh = mesh.with_group("a", lambda x: x[:, 0] < 1).with_group("b", lambda x: x[:, 0] > 1)
+    study = Study(mesh, geometry="axisymmetric")
+    for name, mu in (("a", 0.4), ("b", 0.8)):
+        study.add(f"body {name}", material="neo_hooke", cells=name, mu=mu, kappa=2.0)
+    study.fix("left", u_x=0)
+    study.fix("bottom", u_y=0)
+    study.fix("right", u_x=0.1)
+    result = study.solve()
+    assert result.mean("x") == pytest.approx(2.0)  # of 0 to 4
+    assert result.mean("y") == pytest.approx(2 / 3)  # of discs
+    assert result.mean("mu") == pytest.approx((0.4 * 1 + 0.8 * 3) / 4)
+    assert result.mean("mu", "b") == result.mean("mu", block="body b") == pytest.approx(0.8)
+    assert result.mean("u_x", "right") == pytest.approx(0.1)
+    assert result.mean("y", "top") == pytest.approx(1.0)
+    volumes = result.integral("y", "right") / result.integral("1", "right")
+    assert result.mean("y", "right") == pytest.approx(volumes, rel=1e-14)
+    with pytest.raises(StudyError, match="'energy' alone has no values at points"):
+        result.mean("energy")
+
+
+def test_the_mean_strain_of_a_bar_is_that_of_its_ends() -> None:
+    result = bent(order=2)
+    assert result.mean("P_xx") == pytest.approx(0.05, rel=1e-9)
+    assert result.mean("u_x", "right") * 1.0 == pytest.approx(result.integral("u_x", "right"))
+
+
 def test_heat_content() -> None:
     study = Study(Mesh.rectangle(1.0, 0.5, cells=(6, 3), shape="triangle"))
     study.add("plate", str(BODY), k=1.0, c=2.0)
