@@ -1,8 +1,8 @@
-"""The C compiler as a command, the flags that it understands, and its calls.
+"""The compiler of C, or of C++, as a command, the flags that it understands, and its calls.
 
-It is $CC, else the first of `SYSTEM` on the PATH, else the one that the package `ziglang` brings
-(`pip install 'softehl[compiler]'`): a clang with the headers and libraries of C, for machines that
-have no compiler.
+It is $CC or $CXX, else the first of its language on the PATH, else the one that the package
+`ziglang` brings (`pip install 'softehl[compiler]'`): a clang with headers and libraries, for
+machines that have no compiler.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import shlex
 import shutil
 import subprocess
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -21,35 +22,58 @@ from pathlib import Path
 from softehl.codegen.abi import BuildError, NoCompilerError
 from softehl.log import LOG
 
-SYSTEM = () if os.name == "nt" else ("cc", "gcc", "clang")
-"""Names of compilers of the system. None on Windows: gcc may store vectors of 32 bytes at places
-that the system aligns to 16 (GCC bug 54412), and clang needs the libraries of Visual Studio.
-"""
+
+@dataclass(frozen=True)
+class Language:
+    """A language: the variable of its compiler, and names of compilers of the system.
+
+    On Windows no compiler of the system is taken: gcc may store vectors of 32 bytes at places that
+    the system aligns to 16 (GCC bug 54412), and clang needs the libraries of Visual Studio.
+    """
+
+    name: str
+    variable: str
+    names: tuple[str, ...]
+
+    @property
+    def system(self) -> tuple[str, ...]:
+        """Names that are looked for."""
+        return () if os.name == "nt" else self.names
+
+    @property
+    def remedy(self) -> str:
+        """Advice without a compiler."""
+        return f"install one, set {self.variable} to one, or pip install 'softehl[compiler]'"
+
+
+C = Language("C", "CC", ("cc", "gcc", "clang"))
+CXX = Language("C++", "CXX", ("c++", "g++", "clang++"))
 GCC_ALONE = ("-fno-tree-pre", "-fschedule-insns2", "-fgcse", "-fpeephole2")
 """Flags that the command `zig cc` refuses; other clangs ignore them."""
-REMEDY = "install one, set CC to one, or pip install 'softehl[compiler]'"
 
 
-def compiler() -> list[str]:
-    """The C compiler as a command; `cc` where there is none.  Raises BuildError."""
-    command = os.environ.get("CC", "")
+def compiler(language: Language = C) -> list[str]:
+    """The compiler as a command; `cc` or `c++` where there is none.  Raises BuildError."""
+    variable = language.variable
+    command = os.environ.get(variable, "")
     try:
         arguments = shlex.split(command, posix=os.name != "nt")
     except ValueError as error:
         reason = str(error)[:1].lower() + str(error)[1:]
         raise BuildError(
-            f"CC={command!r} is no command ({reason}): set CC to a C compiler"
+            f"{variable}={command!r} is no command ({reason}): set {variable} to a "
+            f"{language.name} compiler"
         ) from None
     if arguments:
         return [word.strip('"') for word in arguments]
-    compiler = next(filter(_is_installed, SYSTEM), None)
-    if compiler is not None:
-        return [compiler]
+    installed = next(filter(_is_installed, language.system), None)
+    if installed is not None:
+        return [installed]
     zig = ziglang()
     if zig is None:
-        return ["cc"]
-    _log_ziglang(zig)
-    return [str(zig), "cc"]
+        return [language.names[0]]
+    _log_ziglang(zig, language)
+    return [str(zig), "cc"]  # also of C++: kernels need no library, which `zig c++` would build
 
 
 def ziglang() -> Path | None:
@@ -80,12 +104,14 @@ def note() -> str:
     return " with the compiler of the package ziglang" if is_zig(compiler()) else ""
 
 
-def called(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
+def called(command: Sequence[str], language: Language = C) -> subprocess.CompletedProcess[str]:
     """Call a command of the compiler; raises BuildError where it cannot be run."""
+    name, variable = language.name, language.variable
     if shutil.which(command[0]) is None:
-        named = bool(os.environ.get("CC", "").strip())
-        kind, remedy = (BuildError, "set CC to one that is") if named else (NoCompilerError, REMEDY)
-        raise kind(f"no C compiler: {command[0]!r} is not on the PATH; {remedy}")
+        missing = f"no {name} compiler: {command[0]!r} is not on the PATH; "
+        if os.environ.get(variable, "").strip():
+            raise BuildError(f"{missing}set {variable} to one that is")
+        raise NoCompilerError(f"{missing}{language.remedy}")
     try:
         return subprocess.run(
             command,
@@ -97,20 +123,21 @@ def called(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
         )
     except OSError as error:
         raise BuildError(
-            f"{command[0]} cannot be run ({error.strerror}): set CC to a C compiler"
+            f"{command[0]} cannot be run ({error.strerror}): set {variable} to a {name} compiler"
         ) from None
 
 
 @cache
-def _log_ziglang(program: Path) -> None:
+def _log_ziglang(program: Path, language: Language) -> None:
     """One line in the log of a process."""
     try:
         release = version("ziglang")
     except PackageNotFoundError:
         release = str(program)
-    names = ", ".join(SYSTEM)
-    reason = f"none of {names} is on the PATH" if names else "CC is not set"
-    LOG.info("the C compiler is that of the package ziglang %s: %s", release, reason)
+    names = ", ".join(language.system)
+    reason = f"none of {names} is on the PATH" if names else f"{language.variable} is not set"
+    line = "the %s compiler is that of the package ziglang %s: %s"
+    LOG.info(line, language.name, release, reason)
 
 
 def _is_installed(name: str) -> bool:

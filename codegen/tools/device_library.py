@@ -5,12 +5,11 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 from softehl.codegen import pipeline
-from softehl.codegen.abi import BuildError, NoCompilerError
+from softehl.codegen.abi import BuildError
+from softehl.codegen.c_compiler import CXX, called, compiler, supported
 from softehl.codegen.emit.device import header
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import cache_dir
@@ -51,16 +50,15 @@ def device_source(definition: Definition, real: str = "double") -> DeviceSource:
         symmetric=kernels.symmetric,
         orders=tuple(kernels.orders),
         kernels={name: arguments.count("*") for name, arguments in signatures},
+        routines=any(routines for _, _, routines in kernels.parts.values()),
         real="float32" if real == "float" else "float64",
     )
 
 
 def emulated_library(source: DeviceSource, fibers: bool = False) -> Path:
     """The kernels compiled as C++, from the cache.  Raises `BuildError`."""
-    compiler = os.environ.get("CXX") or shutil.which("c++") or shutil.which("g++")
-    if compiler is None:
-        raise NoCompilerError("emulated device: no C++ compiler; set $CXX")
-    command = [*compiler.split(), *FLAGS, *(["-DSOFTEHL_FIBERS"] if fibers else [])]
+    found = compiler(CXX)
+    command = [*found, *supported(found, FLAGS), *(["-DSOFTEHL_FIBERS"] if fibers else [])]
     digest = hashlib.sha256("\0".join([*source.files.values(), *command]).encode()).hexdigest()
     folder = cache_dir.root() / "device" / digest[:32]
     library = folder / "kernels.so"
@@ -71,7 +69,7 @@ def emulated_library(source: DeviceSource, fibers: bool = False) -> Path:
         (folder / name).write_text(text, encoding="utf-8")
     made = folder / f"kernels-{os.getpid()}.so"
     command += ["-x", "c++", str(folder / next(iter(source.files))), "-o", str(made)]
-    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False)
+    done = called(command, CXX)
     if done.returncode:
         raise BuildError(f"{' '.join(command)} failed: {done.stderr.strip()[:2000]}")
     made.replace(library)

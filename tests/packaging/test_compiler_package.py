@@ -37,6 +37,7 @@ def imitated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("PATH", str(empty))
     monkeypatch.delenv("CC", raising=False)
+    monkeypatch.delenv("CXX", raising=False)
     return package / "zig"
 
 
@@ -51,6 +52,9 @@ def test_it_is_taken_where_there_is_no_other(
     assert line.endswith(": none of cc, gcc, clang is on the PATH")
     monkeypatch.setenv("CC", "icx -m64")
     assert c_compiler.compiler() == ["icx", "-m64"]
+    assert c_compiler.compiler(c_compiler.CXX) == [str(imitated), "cc"]
+    monkeypatch.setenv("CXX", "icpx")
+    assert c_compiler.compiler(c_compiler.CXX) == ["icpx"]
 
 
 @pytest.mark.parametrize("name", ["gcc", "clang"])
@@ -104,6 +108,25 @@ def alone(tmp_path: Path) -> Program:
         )
 
     return run
+
+
+@needs_zig
+@pytest.mark.slow
+def test_an_emulated_device_runs_without_a_compiler(alone: Program) -> None:
+    text = """
+from softehl import Mesh, Study
+from tests.device.test_device_kernels import page
+study = Study(Mesh.rectangle(1, 1, cells=(2, 2)))
+study.add("sheet", page("springs"), E=1.0, bed=1.0)
+study.fix("bottom", u_x=0, u_y=0)
+study.load("top", u_x=0.01)
+for device in (None, "emulated"):
+    print(f'{study.solve(linear="matrix-free", device=device).at((1, 1))["u_x"]:.12e}')
+"""
+    done = alone("-c", LOGGED + text)
+    here, there = done.stdout.split()
+    assert here == there
+    assert "the C++ compiler is that of the package ziglang" in done.stderr
 
 
 @needs_zig

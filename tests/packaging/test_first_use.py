@@ -145,7 +145,7 @@ def missing(process: subprocess.Popen[str]) -> str:
 
 def test_a_checkout_without_a_compiler_says_what_to_do(checkout: Path, tmp_path: Path) -> None:
     last = missing(using(checkout, **without_compiler(checkout, tmp_path)))
-    assert last.endswith(f"no C compiler: 'cc' is not on the PATH; {c_compiler.REMEDY}")
+    assert last.endswith(f"no C compiler: 'cc' is not on the PATH; {c_compiler.C.remedy}")
 
 
 def test_the_plain_library_can_be_asked_for(wheel: Path, checkout: Path, cache: Path) -> None:
