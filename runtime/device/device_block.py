@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -89,6 +89,15 @@ class DeviceBlock:
         other.history = self._history(block, self.module)
         return other
 
+    def converted(self, module: DeviceModule) -> DeviceBlock:
+        """These elements in the precision of another module; they share their places."""
+        real = module.source.real
+        history = None if self.history is None else self.history.astype(real)
+        X, parameters = self.X.astype(real), self.parameters.astype(real)
+        other = replace(self, module=module, X=X, parameters=parameters, history=history)
+        other.geometry = self.geometry.astype(real)
+        return other
+
     @staticmethod
     def _history(block: ElementBlock, module: DeviceModule) -> Any:
         """History with x running first in the points, block by block."""
@@ -112,9 +121,9 @@ class DeviceBlock:
         self.module.launch("geometry", self.n, (self.places, self.X, kept))
         return kept
 
-    def residual(self, u: Any, y: Any) -> None:
-        """y += residual at u."""
-        arrays = self.parameters, self.history, self.index, self.places, self.X, u, y
+    def residual(self, u: Any, y: Any, sizes: Any = None) -> None:
+        """y += residual at u; sizes += magnitudes of the residuals of elements."""
+        arrays = self.parameters, self.history, self.index, self.places, self.X, u, sizes, y
         self.module.launch("residual", self.n, arrays)
 
     def product(self, u: Any, x: Any, y: Any) -> None:

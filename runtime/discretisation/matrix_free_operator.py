@@ -6,7 +6,6 @@ are B x = c, follow from B' f = r - A x (`TieForces`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Protocol
@@ -45,7 +44,7 @@ class TieForces:
 
     matrix: (n, n) their part of the tangent. equations: B, (t, n), without prescribed unknowns, and
     normal: factors of B B'. forces: (t,) numbers of the forces. constraints: of the unknowns, and
-    levels: of the unknowns of every level.
+    levels: of the unknowns of every level, and interpolations between them.
     """
 
     matrix: csr_array
@@ -54,11 +53,13 @@ class TieForces:
     forces: Integers
     constraints: Constraints
     levels: tuple[Constraints, ...]
+    interpolations: tuple[csr_array, ...]
 
     @classmethod
-    def of(cls, problem: Problem, levels: Sequence[Integers]) -> TieForces:
-        """Of a problem, for levels of unknowns of these numbers."""
+    def of(cls, problem: Problem, multigrid: MultigridLevels) -> TieForces:
+        """Of a problem, for the levels of multigrid."""
         constraints, n = problem.constraints, problem.assembler.size
+        levels = tuple(constraints.restricted(numbers) for numbers in multigrid.unknowns)
         ties = tie_dofs(problem.assembler)
         a, b, forces = ties.T
         t, ones = len(ties), np.ones(len(ties))
@@ -77,7 +78,11 @@ class TieForces:
             normal=normal,
             forces=forces,
             constraints=constraints,
-            levels=tuple(constraints.restricted(numbers) for numbers in levels),
+            levels=levels,
+            interpolations=tuple(
+                csr_array(without(step, upper.moving) @ lower.square)
+                for step, (upper, lower) in zip(multigrid.steps, pairwise(levels), strict=True)
+            ),
         )
 
     def shift(self, r: Array) -> Array:
@@ -118,8 +123,20 @@ class VectorSpace(Protocol):
         """A matrix of the host in this space."""
         ...
 
+    def interpolation(self, level: int, P: csr_array) -> tuple[Any, Any]:
+        """Interpolation to a level and its transpose, the same in many Newton steps."""
+        ...
+
+    def random(self, n: int, number: int = 0) -> Any:
+        """A vector of random numbers, always the same."""
+        ...
+
     def host(self, a: Any) -> Array:
         """A vector of this space on the host."""
+        ...
+
+    def converted(self, a: Any) -> Any:
+        """A vector of another space, of the same place, in this one."""
         ...
 
     def coarse(self, A: csr_array, nullspace: Array, block: int) -> Apply:
@@ -128,7 +145,11 @@ class VectorSpace(Protocol):
 
 
 class Backend(Protocol):
-    """Place of products and linear solutions: the host, or a device."""
+    """Place of residuals, products and linear solutions: the host, or a device."""
+
+    def problem(self, problem: Problem, levels: MultigridLevels) -> Problem:
+        """The problem with residuals that are evaluated there."""
+        ...
 
     def product(
         self, block: ElementBlock, x: Array, parameters: Array, levels: MultigridLevels
@@ -147,13 +168,17 @@ class Backend(Protocol):
         """The matrix of a block at the lower order, and its part of the diagonal of K, (n,)."""
         ...
 
-    def space(self, operator: MatrixFreeOperator) -> VectorSpace:
-        """The vectors of linear solutions of an operator."""
+    def spaces(self, operator: MatrixFreeOperator) -> tuple[VectorSpace, VectorSpace]:
+        """The vectors of linear solutions of an operator, and of their preconditioner."""
         ...
 
 
 class Processor:
     """The processor of this process."""
+
+    def problem(self, problem: Problem, levels: MultigridLevels) -> Problem:
+        """See `Backend`."""
+        return problem
 
     def product(
         self, block: ElementBlock, x: Array, parameters: Array, levels: MultigridLevels
@@ -172,9 +197,10 @@ class Processor:
         """See `Backend`."""
         return coarse_matrix(block, product, x, levels, free)
 
-    def space(self, operator: MatrixFreeOperator) -> VectorSpace:
+    def spaces(self, operator: MatrixFreeOperator) -> tuple[VectorSpace, VectorSpace]:
         """See `Backend`."""
-        return HostSpace(operator)
+        space = HostSpace(operator)
+        return space, space
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +221,19 @@ class HostSpace:
         """See `VectorSpace`."""
         return A
 
+    def interpolation(self, level: int, P: csr_array) -> tuple[csr_array, csr_array]:
+        """See `VectorSpace`."""
+        return P, csr_array(P.T)
+
+    def random(self, n: int, number: int = 0) -> Array:
+        """See `VectorSpace`."""
+        return random_vector(n, number)
+
     def host(self, a: Array) -> Array:
+        """See `VectorSpace`."""
+        return a
+
+    def converted(self, a: Array) -> Array:
         """See `VectorSpace`."""
         return a
 
@@ -350,8 +388,11 @@ class MatrixFreeOperator:
 
     def _iterated(self, b: Array) -> Array:
         """z of T' K T z = b, node by node; zero for constrained unknowns."""
-        settings, space = self.iteration, self.backend.space(self)
-        cycle = self._multigrid(space)
+        settings, (space, inner) = self.iteration, self.backend.spaces(self)
+        cycle = self._multigrid(inner)
+        mixed = inner is not space
+        if mixed:
+            cycle = _converted(space, inner, cycle)
         if self._is_symmetric(space):
             result = conjugate_gradients(
                 space.apply,
@@ -374,22 +415,22 @@ class MatrixFreeOperator:
         x = space.host(result.x)
         if not (result.converged or result.negative) or not np.isfinite(x).all():
             raise SingularMatrix(
-                f"matrix-free: no linear solution after {result.iterations} iterations: leave "
-                "linear out, or take more steps"
+                f"matrix-free: no linear solution after {result.iterations} iterations: "
+                f"{'leave precision out, ' if mixed else ''}leave linear out, or take more steps"
             )
         return x
 
     def is_symmetric(self) -> bool:
         """True if two random vectors say so."""
-        return self._is_symmetric(self.backend.space(self))
+        return self._is_symmetric(self.backend.spaces(self)[0])
 
     def _is_symmetric(self, space: VectorSpace) -> bool:
-        u, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, len(self.diagonals)))
-        Ku, Kv = (space.host(space.apply(space.vector(a))) for a in (u, v))
-        size = np.linalg.norm(u) * np.linalg.norm(Kv)
-        return bool(abs(u @ Kv - v @ Ku) <= 1e-10 * size)
+        u, v = (space.random(len(self.diagonals), k) for k in range(2))
+        Ku, Kv = space.apply(u), space.apply(v)
+        size = float(np.linalg.norm(u)) * float(np.linalg.norm(Kv))
+        return abs(float(u @ Kv) - float(v @ Ku)) <= 1e-10 * size
 
-    def _multigrid(self, space: VectorSpace) -> MultigridCycle:
+    def _multigrid(self, space: VectorSpace) -> Apply:
         levels, level_constraints = self.levels, self.ties.levels
         diagonal = self.diagonals[levels.unknowns[0]]
         if not np.isfinite(diagonal).all():
@@ -397,18 +438,31 @@ class MatrixFreeOperator:
         level_constraints[0].collect(diagonal)
         diagonal[self.constrained] = 1.0
         multigrid_levels, matrix = list[MultigridLevel](), self.lower
-        for step, (upper, lower) in zip(levels.steps, pairwise(level_constraints), strict=True):
-            P = without(step, upper.moving) @ lower.square
+        for k, (P, upper) in enumerate(
+            zip(self.ties.interpolations, level_constraints[:-1], strict=True)
+        ):
+            transfer = space.interpolation(k, P)
             if not multigrid_levels:
-                multigrid_levels.append(level_in(space, space.apply, diagonal, P))
+                multigrid_levels.append(level_in(space, space.apply, diagonal, transfer))
                 continue
             A = _with_ones(matrix, upper.moving)
-            multigrid_levels.append(level_in(space, space.matrix(A).__matmul__, A.diagonal(), P))
+            apply = space.matrix(A).__matmul__
+            multigrid_levels.append(level_in(space, apply, A.diagonal(), transfer))
             matrix = csr_array(P.T @ matrix @ P)
         moving = level_constraints[-1].moving
         masked_nullspace = np.where(moving[:, None], levels.nullspace, 0.0)
         lowest = space.coarse(_with_ones(matrix, moving), masked_nullspace, levels.components)
         return MultigridCycle(multigrid_levels, lowest)
+
+
+def _converted(space: VectorSpace, inner: VectorSpace, action: Apply) -> Apply:
+    """A linear function of vectors of an inner space for those of a space, without overflow."""
+
+    def apply(v: Any) -> Any:
+        size = float(np.linalg.norm(v)) or 1.0
+        return size * space.converted(action(inner.converted(v / size)))
+
+    return apply
 
 
 def _on_host(space: VectorSpace, action: Apply) -> Apply:
@@ -417,17 +471,16 @@ def _on_host(space: VectorSpace, action: Apply) -> Apply:
 
 
 def level_in(
-    space: VectorSpace, apply: Apply, diagonal: Array, interpolation: csr_array
+    space: VectorSpace, apply: Apply, diagonal: Array, transfer: tuple[Any, Any]
 ) -> MultigridLevel:
-    """A level of multigrid in a space."""
-    start = np.random.default_rng(0).uniform(-1.0, 1.0, len(diagonal))
-    return MultigridLevel.of(
-        apply,
-        space.vector(diagonal),
-        space.matrix(interpolation),
-        space.matrix(csr_array(interpolation.T)),
-        space.vector(start),
-    )
+    """A level of multigrid in a space; transfer: interpolation and its transpose there."""
+    start = space.random(len(diagonal))
+    return MultigridLevel.of(apply, space.vector(diagonal), *transfer, start)
+
+
+def random_vector(n: int, number: int = 0) -> Array:
+    """Random numbers between -1 and 1, (n,), always the same of a number."""
+    return np.random.default_rng(number).uniform(-1.0, 1.0, n)
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,6 +36,7 @@ from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.suggestions import join_names
 
+PRECISIONS = ("double", "mixed")
 _WHO = 'linear = "matrix-free"'
 NO_INERTIA = f"{_WHO}: inertia has no such products; leave linear out"
 
@@ -62,6 +63,9 @@ class MatrixFree:
     device : str, optional
         "cuda": products and linear solutions on a GPU, by CuPy. "emulated": the same kernels,
         compiled for the processor, for tests. Left out: the processor, by kernels in C.
+    precision : str
+        "mixed", with a device: multigrid in single precision, everything else in double. "double":
+        all of it in double.
 
     Raises
     ------
@@ -74,9 +78,19 @@ class MatrixFree:
     threads: int | None = None
     iterations: list[int] = field(default_factory=list)
     device: str | None = None
+    precision: str = "double"
 
     def __post_init__(self) -> None:
         """Raises StudyError for settings that no solution can meet."""
+        if self.precision not in PRECISIONS:
+            raise StudyError(
+                f"precision = {self.precision!r}: allowed are {join_names(map(repr, PRECISIONS))}"
+            )
+        if self.precision == "mixed" and self.device is None:
+            raise StudyError(
+                'precision = "mixed": the kernels of the processor are in double precision; give a '
+                "device, or leave precision out"
+            )
         if self.device not in (None, *DEVICES):
             raise StudyError(
                 f"device = {self.device!r}: allowed are {join_names(map(repr, DEVICES))}, or leave "
@@ -102,7 +116,7 @@ class MatrixFree:
         from softehl.runtime.device.device_operator import Device
 
         assert self.device is not None
-        device = Device(self.device)
+        device = Device(self.device, mixed=self.precision == "mixed")
         for name in system.blocks:
             device.require(system.assembler.block(name))
         return device
@@ -166,7 +180,8 @@ class _MatrixFreeCommunicator(Communicator):
 
     def distribute(self, problem: Problem) -> MatrixFreeProblem:
         """See `Communicator`."""
-        return MatrixFreeProblem(problem, self.levels, self.iteration, self.backend)
+        there = self.backend.problem(problem, self.levels)
+        return MatrixFreeProblem(there, self.levels, self.iteration, self.backend)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +219,7 @@ class MatrixFreeProblem:
     @cached_property
     def ties(self) -> TieForces:
         """Ties of all its steps."""
-        return TieForces.of(self.problem, self.levels.unknowns)
+        return TieForces.of(self.problem, self.levels)
 
     def residual(self, x: Array) -> Array:
         """See `Problem`."""

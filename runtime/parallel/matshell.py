@@ -47,7 +47,7 @@ class MatrixFreeShell:
     def __post_init__(self) -> None:
         """An empty shell."""
         self.constrained = self.problem.constraints.prescribed[self.exchange.owned]
-        self.ties = alone.TieForces.of(self.problem, self.levels.unknowns)
+        self.ties = alone.TieForces.of(self.problem, self.levels)
         sizes = self.exchange.vector.getSizes()
         self.matrix = petsc().Mat().createPython((sizes, sizes), self, comm=world())
         self.matrix.setUp()

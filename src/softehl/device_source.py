@@ -21,8 +21,8 @@ class DeviceSource:
     block of threads. dimension, fields, line: of the cell, of every order in the index of the
     kernels, points along a line. geometry, moduli: numbers of a point that `geometry` and `moduli`
     store. history: numbers of a point. symmetric: whether the tangent is. orders: with which
-    matrices are assembled. kernels: name -> number of its arrays. real: type of NumPy of its
-    numbers.
+    matrices are assembled. kernels: name -> number of its arrays. routines: whether a point calls
+    some, such as a local iteration. real: type of NumPy of its numbers.
     """
 
     name: str
@@ -38,6 +38,7 @@ class DeviceSource:
     symmetric: bool
     orders: tuple[int, ...]
     kernels: dict[str, int]
+    routines: bool = False
     real: str = "float64"
 
     @property

@@ -293,7 +293,7 @@ def by_fibers(case: Case, kernel: str, source: DeviceSource) -> float:
         if kernel == "diagonal":
             arrays, expected = (moduli, device.index, y), K.diagonal()
         if kernel == "residual":
-            arrays = (*shared, device.places, device.X, u, y)
+            arrays = (*shared, device.places, device.X, u, None, y)
             expected = case.nodal(case.assembler.residual(case.x, {"body": case.parameters}))
         module.launch(kernel, device.n, arrays, backwards=backwards)
         found.append(difference(y, expected) if np.isfinite(y).all() else np.inf)

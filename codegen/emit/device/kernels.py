@@ -5,7 +5,7 @@ are spread over its threads; what passes between threads stands in shared memory
 point, the matrices along lines and the pulled-back moduli are those of the kernels in C with one
 lane.
 
-    residual(n, parameters, history, index, places, X, u, y)            y += residual
+    residual(n, parameters, history, index, places, X, u, sizes, y)     y += residual
     geometry(n, places, X, kept)                         inverse Jacobian, volume, positions
     product(n, parameters, history, index, places, X, u, x, y)          y += K x, all computed
     product_geometry(n, parameters, history, index, kept, u, x, y)      y += K x by `geometry`
@@ -21,7 +21,8 @@ have nodes of their own, behind those of the fields of higher order. places (n, 
 the same for its coordinates in X. history, kept: (blocks, numbers, threads with a point), x running
 first in the points of an element. low (n, nodes of order P): number of the first unknown of a node.
 rows: start of the row of every unknown in `values` of a CSR matrix. slots (n, nodes, nodes): place
-in the row of the first unknown of the second node.
+in the row of the first unknown of the second node. sizes: + magnitudes of the residuals of the
+elements; null if they are not sought.
 """
 
 from __future__ import annotations
@@ -335,7 +336,7 @@ class DeviceKernels(BlockSizes):
         out.add(f"const int e = l / {nodes}, a = l % {nodes};")
         self._position(out, f.n, "a")
 
-    def _from_points(self, out: Lines, result: str) -> None:
+    def _from_points(self, out: Lines, result: str, sizes: str = "") -> None:
         """Fluxes in sl, and of values in s0, to the nodes, added to a vector."""
         full, name = self.C * self.elements * self.size, self.layout.d.name
         for axis in range(self.D):
@@ -346,10 +347,10 @@ class DeviceKernels(BlockSizes):
                 self._lines(out, function, f"(sl + {axis * full})", "s0", axis, f)
         # no barrier: the next sweep has the same lines on the same threads
         self._sweeps(out, "back", reversed(range(self.D)), self.fields)
-        self._to_nodes(out, result, self._last)
+        self._to_nodes(out, result, self._last, sizes)
 
-    def _to_nodes(self, out: Lines, result: str, source: str) -> None:
-        """Values at the nodes in an array, added to a vector."""
+    def _to_nodes(self, out: Lines, result: str, source: str, sizes: str = "") -> None:
+        """Values at the nodes in an array, added to a vector, and their magnitudes to another."""
         for f in self.fields:
             self._nodes_of(out, f)
             out.open(f"if (block * {self.elements} + e < n)")
@@ -358,6 +359,8 @@ class DeviceKernels(BlockSizes):
             for c in range(f.first, f.last):
                 value = f"{source}[{c * self.elements * self.size} + at]"
                 out.add(f"ADD({result} + to + {c - f.first}, {value});")
+                if sizes:
+                    out.add(f"if ({sizes}) ADD({sizes} + to + {c - f.first}, fabs({value}));")
             out.close()
             out.close()
 
@@ -486,8 +489,8 @@ class DeviceKernels(BlockSizes):
         self._fluxes(out)
         out.close()
         out.add("SYNC")
-        self._from_points(out, "y")
-        return self._kernel("residual", _OF_STATE + "V *restrict y", out)
+        self._from_points(out, "y", sizes="sizes")
+        return self._kernel("residual", _OF_STATE + "V *restrict sizes, V *restrict y", out)
 
     def _geometry(self) -> str:
         out = Lines()
