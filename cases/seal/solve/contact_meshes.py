@@ -1,7 +1,8 @@
 """The meshes of the dry contact, each made for the contact that was seen on the one before.
 
 A path from rest is followed on a coarse mesh with equal segments, unless another run has left a
-state there. Graded meshes follow, and finer ones of the same layout.
+state there. Graded meshes follow, and finer ones of the same layout. At high pressures the path
+goes on in legs, each with a graded mesh of its own.
 
 Runs leave contact states for each other, as the contact stage knows neither speed nor film. A state
 is a file, named by all that it depends on. It is never trusted: it is where Newton's method starts

@@ -5,8 +5,9 @@ path is resumed at a checkpoint under less pressure, carried in the same way; if
 on either, at rest, which is the same on every mesh.
 
 Above two or three shear moduli the section fills the corners of its groove but for pockets of a few
-elements. Newton's method does not correct the errors that interpolation leaves there. Under half of
-the pressure the pockets are wide.
+elements. Newton's method does not correct the errors that interpolation leaves there. Under less
+pressure the pockets are wider: checkpoints are kept half a shear modulus apart. At 5.4 shear moduli
+the pocket that stops a carry is that between housing and wall, whose mesh differs with the arc's.
 
 Beyond the end of a load path the section creeps to its contact, by pseudo-transient continuation.
 No step of the pressure is short enough for a section that snaps over, or for a node that is in
