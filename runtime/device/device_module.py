@@ -99,6 +99,8 @@ class CudaModule(DeviceModule):
         """See `DeviceModule`."""
         given = [np.uintp(0) if a is None else a for a in arrays]
         function = self._module.get_function(kernel)
+        if not n:
+            return  # CUDA refuses a grid of no blocks
         function((self.source.blocks(n),), (self.source.threads,), (np.int32(n), *given))
 
     def host(self, a: Any) -> Any:

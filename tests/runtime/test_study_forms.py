@@ -127,7 +127,7 @@ def test_derivatives_and_energies_know_the_rule_of_a_block() -> None:
 def test_products_without_a_matrix_refuse_a_rule() -> None:
     study = line()
     study.add("line", diffusion(), along={"p": 4}, c=1.0)
-    with pytest.raises(NoProductError, match="'line': products have the quadrature of the page"):
+    with pytest.raises(NoProductError, match="'line' has a rule of its own"):
         require_product(study.system().assembler.block("line"))
 
 
