@@ -40,7 +40,7 @@ def require_product(block: ElementBlock) -> Kernel:
     kernel = block.kernel
     if block.rule is not None:
         raise NoProductError(
-            f"block {block.name!r} has a rule of its own (given, or of a contact with a rigid body): "
+            f"block {block.name!r} has a rule of its own (given, or of rigid contact): "
             "products have the quadrature of the page; take another linear solver"
         )
     if isinstance(kernel, Kernel) and kernel.kept:
