@@ -19,6 +19,16 @@ from tests.cases import gland_matrix, section_matrix
 STRATA = 5
 HIGHEST = 20.0  # MPa, as for the O-rings
 OTHERS = ("u_cup", "d_ring", "u_cup", "rectangular", "u_cup", "trapezoid")
+OF_ALL_SECTIONS = {
+    "round": (16, 13, 20),
+    "rectangular": (10,),
+    "trapezoid": (8,),
+    "d_ring": (2,),
+    "x_ring": (1, 66),
+    "u_cup": (9, 14),
+}
+"""Numbers of ten seals of the sample, of all sections, with 60 states, at p_s / mu of 0.2 to 3."""
+
 STATES = 2 * len(gland_matrix.SPEEDS)
 
 

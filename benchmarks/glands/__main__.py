@@ -1,8 +1,9 @@
 """Run a sample of seals with the program of a checkout, or compare two such runs.
 
     python -m benchmarks.glands FILE --source CHECKOUT/src [--limit N] [--first K] [--timeout S]
+    python -m benchmarks.glands FILE --source CHECKOUT/src --sections
     python -m benchmarks.glands --compare OLD NEW
-    python -m benchmarks.glands FILE --page PAGE
+    python -m benchmarks.glands FILE --page PAGE [--sections]
 
 Each seal is a run of the command line in a process of its own. FILE gets a line of JSON for each as
 soon as it has ended; seals that FILE has are not run again. --page writes the table of FILE between
@@ -23,11 +24,15 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from benchmarks.glands import STATES, Drawn, sample
-from benchmarks.glands.table import comparison, read, results
+from benchmarks.glands import OF_ALL_SECTIONS, STATES, Drawn, sample
+from benchmarks.glands.table import comparison, read, results, theories
 from benchmarks.marked import renew
 
 RUN = ("-m", "softehl", "run", "seal.toml", "--out", "out", "--quiet", "--pictures", "none")
+COLUMNS = (
+    *("h_star_um", "rod_friction_N", "h_star_error_percent"),
+    *("h_star_theory_um", "inlet_over_pocket", "h_star_theory_sealed_um", "h_star_theory_air_um"),
+)
 SHORT = {"case": "oring", "density": 1, "speeds": [800.0], "stroke": "out", "error_estimate": False}
 
 
@@ -83,14 +88,14 @@ def run(seal: Drawn, source: Path, limit: float) -> dict[str, Any]:
 
 
 def rows(curve: Path) -> dict[str, Any]:
-    """Verdict, h* and friction of the states in a file of a curve, by the speed of the rod."""
+    """Verdict and `COLUMNS` of the states in a file of a curve, by the speed of the rod."""
     if not curve.exists():
         return {}
     with curve.open(encoding="utf-8", newline="") as lines:
         return {
             f"{float(row['rod_speed_mm_s']):+g}": {
                 "verdict": row["verdict"],
-                **{name: float(row[name]) for name in ("h_star_um", "rod_friction_N")},
+                **{name: float(row[name]) for name in COLUMNS if name in row},
             }
             for row in csv.DictReader(lines)
         }
@@ -103,6 +108,7 @@ def main() -> None:
     parser.add_argument("--source", type=Path, help="folder src of the program to run")
     parser.add_argument("--limit", type=int, help="number of seals to run now, at most")
     parser.add_argument("--first", type=int, help="only the first K seals of the sample")
+    parser.add_argument("--sections", action="store_true", help="60 states of all sections")
     parser.add_argument("--timeout", type=float, default=240.0, help="seconds of CPU for a seal")
     parser.add_argument("--compare", type=Path, nargs=2, metavar=("OLD", "NEW"))
     parser.add_argument("--page", type=Path, help="page of the documentation to renew")
@@ -111,13 +117,19 @@ def main() -> None:
         print(comparison(*(read(file) for file in given.compare)))
         return
     if given.file and given.page:
-        renew(given.page, "glands", results(read(given.file)))
+        if given.sections:
+            renew(given.page, "sections", results(read(given.file)))
+            renew(given.page, "theory", theories(read(given.file)))
+        else:
+            renew(given.page, "glands", results(read(given.file)))
         return
     if not given.file or not given.source:
         parser.error("give FILE with --source or --page, or --compare OLD NEW")
     have = read(given.file) if given.file.exists() else {}
     prepare(given.source)
-    missing = (seal for seal in islice(sample(), given.first) if seal.name not in have)
+    few = {f"{section} {k}" for section, numbers in OF_ALL_SECTIONS.items() for k in numbers}
+    seals = [seal for seal in sample() if not given.sections or seal.name in few]
+    missing = (seal for seal in seals[: given.first] if seal.name not in have)
     for seal in islice(missing, given.limit):
         found = run(seal, given.source, given.timeout)
         with given.file.open("a", encoding="utf-8") as lines:

@@ -20,6 +20,7 @@ MISSING = {"verdict": "not reached", "h_star_um": math.nan}
 LARGEST = 0.5  # % between two h* that count as equal
 GROUPS = "| seals | number | states | `ok` old | `ok` new | CPU old, s | CPU new, s |"
 RESULTS = "| seals | number | states | reached | `ok` | share | the others | CPU, s: median, most |"
+THEORY = "| seal | p_s / mu | stroke | h\\*, um | verdicts | theory, % | inlet over pocket |"
 STATES = "| seal | p_s / mu | U, mm/s | old | new | h\\* old, um | new | % |"
 
 
@@ -67,6 +68,32 @@ def result(name: str, runs: Sequence[Run]) -> str:
     times = [run["cpu_s"] for run in runs]
     share = f"{asked} | {verdicts.total()} | {ok} | {100.0 * ok / asked:.1f} %"
     return f"| {name} | {len(runs)} | {share} | {others} | {median(times):.0f}, {max(times):.0f} |"
+
+
+def theories(runs: Runs) -> str:
+    """The theory of the inlet beside the films of a run: a line for each seal and stroke."""
+    lines = [line for run in runs.values() for line in theory(run)]
+    return "\n".join([*head(THEORY), *lines])
+
+
+def theory(run: Run) -> Iterator[str]:
+    """Lines of that table: the strokes of a seal."""
+    for sign, stroke in (("+", "out"), ("-", "in")):
+        states = [state for speed, state in run["states"].items() if speed.startswith(sign)]
+        films = ", ".join(f"{state['h_star_um']:.4g}" for state in states)
+        verdicts = ", ".join(f"`{state['verdict']}`" for state in states)
+        off = ", ".join(difference(state) for state in states)
+        pockets = ", ".join(f"{state['inlet_over_pocket']:.2g}" for state in states)
+        where = f"| {run['seal']} | {run['p_s/mu']:.2g} | {stroke}"
+        yield f"{where} | {films} | {verdicts} | {off} | {pockets} |"
+
+
+def difference(state: dict[str, Any]) -> str:
+    """The theory of a state over its film, minus one, in words."""
+    by_theory = state["h_star_theory_um"]
+    if math.isnan(by_theory):
+        return "none"
+    return f"{100.0 * (by_theory / state['h_star_um'] - 1.0):+.1f}"
 
 
 def groups(pairs: list[tuple[Run, Run]]) -> Iterator[str]:

@@ -49,7 +49,8 @@ HEADER = (
     "asperity_load_percent,boundary_friction_percent,groove_start_mm,groove_end_mm,"
     "groove_pressure_MPa,h_min_sealed_um,h_min_air_um,flux_mismatch_percent,"
     "entrance_pressure_MPa,h_star_theory_um,inlet_over_pocket,inlet_heating_K,film_heating_K,"
-    "heat_to_rod_W,heat_to_seal_W,heat_in_oil_W,density,verdict"
+    "heat_to_rod_W,heat_to_seal_W,heat_in_oil_W,"
+    "h_star_theory_sealed_um,h_star_theory_air_um,density,verdict"
 )
 FAST = ("--set", "speeds=[400, 100]")
 PLOTS = {f"{name}.png" for name in PICTURES}

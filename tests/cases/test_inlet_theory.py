@@ -30,8 +30,21 @@ from softehl.cases.seal.report.profiles import thicknesses
 from softehl.cases.seal.solve.contact_meshes import misplacement
 from softehl.cases.seal.solve.driver import COMPARED, DryContact, _reservation, run
 from softehl.cases.seal.states.contacts import contact_edges
-from softehl.cases.seal.states.estimated import FILMS, contact_of, estimated_state
-from softehl.cases.seal.states.inlet_edges import predicted
+from softehl.cases.seal.states.estimated import (
+    ERRORS,
+    FILMS,
+    GROOVE,
+    contact_of,
+    estimated_state,
+    theory_by_contact,
+)
+from softehl.cases.seal.states.inlet_edges import (
+    SETTLED,
+    Prediction,
+    Predictions,
+    _Surface,
+    predicted,
+)
 from softehl.cases.seal.states.leakage import net_leakage
 from softehl.cases.seal.states.state import ESTIMATED, UNCERTAIN, Silent
 from softehl.cases.seal.states.summary import run_summary
@@ -206,6 +219,57 @@ def test_estimated_states() -> None:
     assert stribeck_figure(rough, [state, replace(state, rod_speed_mm_s=-50.0)]) is None
     assert np.isfinite(thicknesses(rows)).all()
     assert state.regime
+
+
+def surface(p: Any) -> _Surface:
+    """A flat surface of 1 mm in contact with these pressures (n,)."""
+    s = np.linspace(0.0, 1.0, len(p))
+    points = np.stack([s, np.full(len(p), 25.0)], axis=1)
+    return _Surface(s, points, np.array(p), np.ones(len(p) - 1), np.ones(len(p)), (-1.0, 2.0))
+
+
+def test_the_edge_of_a_contact_of_any_section() -> None:
+    p, nodes = Seal(section="rectangular", groove_width=4.6), np.arange(101)
+    s = np.linspace(0.0, 1.0, 101)
+    smooth = surface(np.sqrt(9.0 * s)).drawn_in(p, nodes, 1.0, 1e-9, None)
+    assert smooth is not None
+    assert smooth.edge.rise == pytest.approx(9.0, rel=1e-6)
+    assert smooth.unsettled < 1e-6
+    assert smooth.edge.pocket == pytest.approx(1.0, rel=1e-6)  # to the end of the section
+    inner = surface(np.sqrt(9.0 * np.maximum(s - 0.2, 0.0))).drawn_in(
+        p, nodes[20:], 1.0, 1e-9, nodes[:11]
+    )
+    assert inner is not None
+    assert inner.edge.pocket == pytest.approx(0.1, rel=1e-6)  # to the contact before
+    peak = surface(1.0 + 2.0 * np.sqrt(s) / (1.0 + 30.0 * s)).drawn_in(p, nodes, 1.0, 1e-9, None)
+    assert peak is None or peak.unsettled > SETTLED
+
+
+def test_the_first_contact_of_several_decides() -> None:
+    edge = Edge(9.0, 0.5, 4.0, 1.0)
+    thick, thin = (Prediction(h, 0.05, edge, 0.05) for h in (1e-3, 8e-4))
+    filled, starved = Predictions((thick, thin), "out"), Predictions((thin, thick), "in")
+    assert (filled.h_star, starved.h_star) == (1e-3, 8e-4)
+    assert (filled.passing, starved.passing) == (0.8, 1.0)
+    assert (filled.applies, starved.applies) == (False, True)
+    assert theory_by_contact(filled) == theory_by_contact(starved)
+    assert theory_by_contact(filled)["h_star_theory_sealed_um"] == pytest.approx(1.0)
+    assert theory_by_contact(Predictions((thick,), "out")) == {}
+    assert not replace(thick, edge=replace(edge, curvature=3.0)).applies
+
+
+@pytest.mark.slow
+def test_estimated_state_of_an_x_ring() -> None:
+    keys: dict[str, Any] = {"groove_width": 4.3, "housing_diameter": 56.4}
+    p = Seal(section="x_ring", lobe_radius=0.9, fillet_radius=0.6, **keys)
+    contact = DryContact.of(p, Silent())
+    # films of docs/validation/sections.md at 200 mm/s
+    for stroke, film in (("out", 0.683), ("in", 0.547)):
+        state = estimated_state(p, contact.system, contact.x, stroke, 200.0)
+        assert state is not None
+        assert state.h_star_um == pytest.approx(film, rel=0.01 * state.h_star_error_percent)
+        assert state.h_star_error_percent >= ERRORS[stroke] + GROOVE
+        assert state.contact_start_mm < state.groove_start_mm < state.groove_end_mm
 
 
 def test_misplaced_segments_are_seen() -> None:

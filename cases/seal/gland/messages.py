@@ -66,7 +66,7 @@ def warnings(p: Seal, pressure: float) -> list[str]:
     """A pressure above what is known to run, keys without effect, what is unusual, a line each."""
     load, beyond = _load(p, pressure)
     message = "the run may take minutes and end without a film"
-    if p.predictable and p.load_ratio(pressure) > HARDEST:
+    if p.estimable and p.load_ratio(pressure) > HARDEST:
         message = "friction is not known there"
     message += "; a harder rubber or a lower pressure helps"
     first = [f"{load}; {message}"] if beyond else []

@@ -117,8 +117,15 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
 
     @property
     def predictable(self) -> bool:
-        """True if the theory of the inlet holds: one round lobe, a closed gap, a graded mesh."""
-        return self.round and not self.opens and self.mesh == "graded"
+        """True if the theory of the inlet holds: a closed gap, a graded mesh."""
+        return not self.opens and self.mesh == "graded"
+
+    @property
+    def estimable(self) -> bool:
+        """True if the theory answers above all films: that of one round lobe, whose pocket shrinks
+        by a law.
+        """
+        return self.round and self.predictable
 
     @model_validator(mode="after")
     def _nothing_contradicts(self) -> Self:

@@ -225,7 +225,7 @@ def require_films(p: Seal, pressure: float) -> None:
 
 
 def _pressure_is_within_reach(p: Seal) -> None:
-    if not p.predictable:
+    if not p.estimable:
         require_films(p, p.sealed_pressure)
 
 

@@ -28,7 +28,12 @@ from softehl.cases.seal.states.contacts import (
     unsealed,
 )
 from softehl.cases.seal.states.estimate import Estimate, reservation
-from softehl.cases.seal.states.estimated import computed, contact_of, estimated_state
+from softehl.cases.seal.states.estimated import (
+    computed,
+    contact_of,
+    estimated_state,
+    theory_by_contact,
+)
 from softehl.cases.seal.states.inlet_edges import predicted
 from softehl.cases.seal.states.results import film_state
 from softehl.cases.seal.states.run_plan import strokes_of
@@ -109,6 +114,7 @@ class Judge:
             rod_friction_error_percent=estimate.friction if estimate and friction_known else nan,
             h_star_theory_um=theory.h_star / MICROMETRE if theory else nan,
             inlet_over_pocket=theory.over_pocket if theory else nan,
+            **theory_by_contact(theory),
         )
         if self.differentiate and differentiable(state):
             state = replace(state, sensitivity=self.differentiate(film))

@@ -188,6 +188,14 @@ class FilmRow(Row):
     heat_to_rod_W: float = column("W", "heat of the friction that goes into the rod", default=nan)
     heat_to_seal_W: float = column("W", "heat that goes into the seal", default=nan)
     heat_in_oil_W: float = column("W", "heat that the oil carries out of the film", default=nan)
+    h_star_theory_sealed_um: float = column(
+        "um",
+        "h* that the theory gives the contact on the sealed side by itself; nan for one",
+        default=nan,
+    )
+    h_star_theory_air_um: float = column(
+        "um", "h* that it gives the contact on the air side; nan for one", default=nan
+    )
     density: int = column(
         "", "density of the mesh of the state: above that of the run where its error was too large"
     )
