@@ -18,6 +18,7 @@ from softehl.cases.seal.equations.inlet_theory import (
     local_inlet,
     thinned,
 )
+from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers.materials import (
     MATERIALS,
@@ -260,11 +261,12 @@ def test_the_first_contact_of_several_decides() -> None:
 
 @pytest.mark.slow
 def test_estimated_state_of_an_x_ring() -> None:
-    keys: dict[str, Any] = {"groove_width": 4.3, "housing_diameter": 56.4}
-    p = Seal(section="x_ring", lobe_radius=0.9, fillet_radius=0.6, **keys)
+    lobes: dict[str, Any] = {"lobe_radius": 0.9, "fillet_radius": 0.6}
+    p = Seal(section="x_ring", groove_width=4.3, housing_diameter=56.4, **lobes)
     contact = DryContact.of(p, Silent())
     # films of docs/validation/sections.md at 200 mm/s
-    for stroke, film in (("out", 0.683), ("in", 0.547)):
+    films: dict[Stroke, float] = {"out": 0.683, "in": 0.547}
+    for stroke, film in films.items():
         state = estimated_state(p, contact.system, contact.x, stroke, 200.0)
         assert state is not None
         assert state.h_star_um == pytest.approx(film, rel=0.01 * state.h_star_error_percent)
