@@ -395,7 +395,7 @@ class UnitCells:
 
     def __getstate__(self) -> dict[str, Any]:
         """For `copy` and `pickle`: without what only saves time."""
-        return {**vars(self), "_states": None, "_time": None, "_shares": []}
+        return {**vars(self), "_states": None, "_time": None, "_groups": []}
 
     @cached_property
     def signature(self) -> str:

@@ -208,6 +208,7 @@ OTHER_WORDS = {
     *("sensitivity", "tolerances", "travel", "service"),
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
     *("modulus_rule", "modulus_table", "glass_transition", "swelling", "compression_set"),
+    *("heating", "viscosity_slope"),
 }
 """Other words for the diameters and the width, for rubber and oil, which are what matters."""
 

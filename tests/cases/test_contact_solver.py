@@ -233,7 +233,7 @@ def test_a_run_that_ends_in_the_gap_says_so() -> None:
     stage = load_stage(build_system(p))
     failed = StageError(stage, Branch((), Status.STEP_TOO_SMALL, ""))
     text = explained(failed, p)[1]
-    for word in ("9 MPa", "gap of 0.05 mm", "fillet 0.2 mm", "backup = true"):
+    for word in ("0 of 9 MPa", "gap of 0.05 mm", "fillet 0.2 mm", "backup = true"):
         assert word in text
 
 

@@ -307,7 +307,7 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
     stages = {
         "% of the way": approach_stage(system),
         "friction of the housing does not hold a ring": release_stage(system, system.at_rest()),
-        "the sealed pressure rose to 0 MPa only": load_stage(system),
+        "the sealed pressure rose to 0 of 9 MPa only": load_stage(system),
     }
     for says, stage in stages.items():
         failed = StageError(stage, Branch((), Status.MAX_ITERATIONS, "last norms"))

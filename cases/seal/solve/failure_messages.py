@@ -65,7 +65,7 @@ def not_released(p: Gland) -> str:
 def not_loaded(p: Seal, reached: float) -> str:
     """The sealed pressure rose to `reached`, MPa."""
     return (
-        f"the sealed pressure rose to {reached:.4g} MPa only "
+        f"the sealed pressure rose to {reached:.4g} of {p.sealed_pressure:.4g} MPa only "
         f"({reached / p.shear_modulus:.2g} times the shear modulus, {_gland(p)}); {_corner(p)}"
     )
 

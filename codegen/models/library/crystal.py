@@ -69,9 +69,7 @@ def crystal(m: Material) -> None:
         normal = [(C11 - C12) * a[k, k] + C12 * a.trace() for k in range(3)]
         shear = [2 * C44 * a[i, j] for i, j in IJ[3:]]
         residual = [b - s / g for b, s in zip(t, (*normal, *shear), strict=True)]
-        return [
-            r + sum(residual) for r in residual
-        ]  # a stress that vanishes is one up to rounding of all
+        return [r + sum(residual) for r in residual]  # zero stresses up to rounding of all
 
     t = m.implicit("t", balance, start=[a / g for a in t_old], size=1, iterations=100)
     strain, total = flow(t)
