@@ -294,7 +294,7 @@ def test_other_motions_balance_too(
     assert table["mass_error"].max() < 1e-9
     assert table["change_percent"][-1] < 1.0
     last = int(table["cycle"][-1])
-    loop = read_table(tmp_path / "c" / f"loop_{last}.csv")
+    loop = read_table(tmp_path / "c" / f"loop_cycle_{last}.csv")
     assert loop["friction_N"].min() < 0.0 < loop["friction_N"].max()
     highest = 2.0 if name == "pressure" else 1.0
     assert loop["sealed_pressure_MPa"].max() == pytest.approx(highest)
