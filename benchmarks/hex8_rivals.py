@@ -9,6 +9,7 @@ cube of N^3 hexahedra with 2 x 2 x 2 points and the same displacements.
 import os
 import sys
 import time
+from contextlib import suppress
 
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
 
@@ -219,6 +220,8 @@ def felupe(n):
 
 def dolfinx(n):
     """Assembled: forms of FFCx into a vector and a matrix of PETSc."""
+    with suppress(ImportError):  # the wheel dolfinx-solver-real finds its MPI by it
+        import dolfinx_solver  # noqa: F401
     import ufl
     from dolfinx import fem, mesh
     from dolfinx.fem import petsc
