@@ -172,8 +172,8 @@ class ContactSolver:
     def leg(self, old: SealSystem, x: Array, new: SealSystem) -> State:
         """The contact state x (n,) of one mesh on another, under the higher pressure of that.
 
-        Where it is not found on the new mesh under its own pressure, the old mesh is kept.  Raises
-        StageError.
+        The old mesh is kept if its state is not found on the new one under its own pressure.
+        Raises StageError.
         """
         begin = Checkpoint(old, old.parameters.sealed_pressure, x)
         try:
