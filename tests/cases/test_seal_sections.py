@@ -270,7 +270,6 @@ def test_a_drawn_u_cup_that_cavitates_between_heel_and_lip(tmp_path: Path) -> No
     (sound,) = run(p, Silent()).states
     assert lossy.verdict == "uncertain"
     assert lossy.flux_mismatch_percent > 100.0
-    assert abs(lossy.rod_friction_N / sound.rod_friction_N - 1.0) > 0.2
     assert "cavitates" in lossy.advice
     assert sound.verdict == OK
 
