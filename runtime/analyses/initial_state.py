@@ -15,7 +15,8 @@ from softehl.runtime.definition.problem_definition import (
 from softehl.runtime.equations.system import System, contacts_with_history
 from softehl.runtime.equations.system_builder import build_system
 from softehl.runtime.kernels.constitutive_model import ModelKernel
-from softehl.runtime.mesh.mesh import Mesh, place_text
+from softehl.runtime.mesh.checks import place_text
+from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.solution import Point, Solution, Status
 

@@ -24,7 +24,8 @@ from softehl.runtime.definition.problem_definition import (
 )
 from softehl.runtime.discretisation.loads import Amount
 from softehl.runtime.io import require_writable
-from softehl.runtime.mesh.mesh import Mesh, place_text
+from softehl.runtime.mesh.checks import place_text
+from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.suggestions import did_you_mean, join_names, misfit
 
 

@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
-from softehl.runtime.mesh.mesh import place_text
+from softehl.runtime.mesh.checks import place_text
 from softehl.runtime.solve.solution import NotConverged, Solution, Status
 
 _ROUNDING = 1e-12

@@ -26,7 +26,8 @@ from softehl.runtime.discretisation.loads import Tie, amount
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.kernels.constitutive_model import ModelKernel
 from softehl.runtime.kernels.run_time_arrays import packed
-from softehl.runtime.mesh.mesh import Mesh, place_text
+from softehl.runtime.mesh.checks import place_text
+from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.suggestions import short_list
 
 _SAME = 1e-12

@@ -31,8 +31,9 @@ from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.equations.contact_setup import contact_of, with_contacts
 from softehl.runtime.equations.system import System
+from softehl.runtime.mesh.checks import place_text
 from softehl.runtime.mesh.face_matching import match_faces
-from softehl.runtime.mesh.mesh import Mesh, place_text
+from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.suggestions import did_you_mean, join_names
 
 

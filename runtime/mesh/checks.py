@@ -1,13 +1,22 @@
-"""Faults of a mesh: cells that are turned inside out, cells or faces that stand twice."""
+"""Faults of a mesh: inverted cells, cells or faces that occur twice."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from softehl.runtime.arrays import Integers
+from softehl.errors import SoftehlError
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.cells import CELLS, jacobians
 from softehl.runtime.mesh.face_matching import is_repeated
-from softehl.runtime.mesh.mesh import Mesh, MeshError, place_text
+
+if TYPE_CHECKING:
+    from softehl.runtime.mesh.mesh import Mesh
+
+
+class MeshError(SoftehlError, ValueError):
+    """A mesh, or a name in it, cannot be used; the message says what is there."""
 
 
 def check(mesh: Mesh) -> None:
@@ -58,3 +67,8 @@ def _require_upright(mesh: Mesh, kind: str, nodes: Integers) -> None:
             f"{worst} at {place_text(points[worst].mean(axis=0))}: number its nodes in the "
             "order of VTK (in the plane counterclockwise)"
         )
+
+
+def place_text(x: Array) -> str:
+    """Coordinates, for messages."""
+    return "(" + ", ".join(f"{value:.4g}" for value in x) + ")"

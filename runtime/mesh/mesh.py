@@ -14,23 +14,23 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softehl.errors import SoftehlError
-from softehl.runtime.arrays import Array, Flags, Integers, frozen
+from softehl.runtime.arrays import Array, Integers, frozen
+from softehl.runtime.mesh import selection
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.face_matching import match_faces, orient_as, unrepeated_faces
+from softehl.runtime.mesh.checks import MeshError, check, place_text
+from softehl.runtime.mesh.face_matching import match_faces, unrepeated_faces
 from softehl.runtime.mesh.partitioning import MeshPartition
-from softehl.runtime.suggestions import did_you_mean, join_names, misfit, short_list
+from softehl.runtime.mesh.selection import Faces, Predicate
+from softehl.runtime.suggestions import did_you_mean, join_names, short_list
 
 if TYPE_CHECKING:
     from softehl.runtime.mesh.point_location import Located, PointLocator
 
-Faces: TypeAlias = Mapping[str, Integers]
-"""Kind of face -> node numbers (n, k), seen from outside counterclockwise."""
 Shape = Literal[
     "quad",
     "serendipity",
@@ -41,15 +41,9 @@ Shape = Literal[
     "lagrange_wedge",
     "pyramid",
 ]
-Predicate = Callable[[Array], Flags]
-"""Of places (n, dim): which of them are meant, (n,)."""
-
+__all__ = ["Faces", "Mesh", "MeshError", "Predicate", "Shape"]
 
 _NEAR = 1e-9  # of the size of a mesh: places closer than that are the same
-
-
-class MeshError(SoftehlError, ValueError):
-    """A mesh, or a name in it, cannot be used; the message says what is there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -454,7 +448,7 @@ class Mesh:
         MeshError
             No face is selected.
         """
-        return replace(self, sides={**self.sides, name: self._meant_faces(where, name)})
+        return replace(self, sides={**self.sides, name: selection.faces_where(self, where, name)})
 
     def with_group(self, name: str, where: Predicate) -> Mesh:
         """Return the mesh with one more named group of cells.
@@ -476,12 +470,7 @@ class Mesh:
         MeshError
             No cell is selected.
         """
-        group = {}
-        for kind, nodes in self.cells.items():
-            inside = _evaluate_predicate(where, self.points[nodes].mean(axis=1), name)
-            group[kind] = np.flatnonzero(inside)
-        if not self.anywhere(any(map(len, group.values()))):
-            raise MeshError(f"group {name!r}: the predicate chooses no cell")
+        group = selection.cells_where(self, where, name)
         return replace(self, groups={**self.groups, name: group})
 
     def split(self) -> Mesh:
@@ -591,21 +580,7 @@ class Mesh:
         MeshError
             There is no such side.
         """
-        if callable(where):
-            return self._meant_faces(where, "the predicate")
-        if where == "boundary" and where not in self.sides:
-            return self.boundary
-        if where not in self.sides:
-            allowed = ", ".join([*self.sides, "boundary"])
-            raise MeshError(
-                f"no side {where!r}{did_you_mean(where, self.sides)}; there are {allowed}"
-            )
-        return {
-            kind: orient_as(faces, self.boundary[kind], CELLS[kind].corners)
-            if kind in self.boundary
-            else faces
-            for kind, faces in self.sides[where].items()
-        }
+        return selection.faces(self, where)
 
     def outer_faces(self, where: str | Predicate) -> Faces:
         """Return the faces of a side of the boundary, which have an outside.
@@ -625,33 +600,7 @@ class Mesh:
         MeshError
             A face has another dimension than the boundary, or belongs to two cells or none.
         """
-        selected = self.faces(where)
-        solid = any(CELLS[kind].dimension == self.dimension for kind in self.cells)
-        for kind, faces in selected.items():
-            cell, outer = CELLS[kind], self.boundary.get(kind, faces[:0])
-            if cell.dimension != self.dimension - 1:
-                name = "the predicate" if callable(where) else f"side {where!r}"
-                what = {0: "nodes", 1: "lines", 2: "faces"}.get(cell.dimension, "cells")
-                face_word = {1: "nodes", 2: "lines"}.get(self.dimension, "faces")
-                raise MeshError(
-                    f"{name} is of {what} ({kind}); in {self.dimension}-D a side of {face_word} of "
-                    f"the boundary is needed, such as {short_list(self._outer_sides())}"
-                )
-            lost = faces[match_faces(faces, outer, cell.corners) < 0] if solid else faces[:0]
-            if len(lost):
-                point_text = place_text(self.points[lost[0]].mean(axis=0))
-                raise MeshError(
-                    f"the face at {point_text} is of two cells or of none: it has no outside"
-                )
-        return selected
-
-    def _outer_sides(self) -> list[str]:
-        """Names of sides of faces of one dimension less than the mesh."""
-        names = [n for n, f in self.sides.items() if self._are_faces(f)]
-        return [*names, "boundary"]
-
-    def _are_faces(self, faces: Faces) -> bool:
-        return all(CELLS[kind].dimension == self.dimension - 1 for kind in faces)
+        return selection.outer_faces(self, where)
 
     def nodes(self, where: str | Predicate) -> Integers:
         """Return the nodes of a side or group, sorted.
@@ -671,17 +620,7 @@ class Mesh:
         MeshError
             There is no such side or group, or no node is selected.
         """
-        if callable(where):
-            selected = np.flatnonzero(_evaluate_predicate(where, self.points, "the predicate"))
-            if not self.anywhere(len(selected)):
-                raise MeshError("the predicate chooses no node")
-            return selected
-        if where in self.groups and where not in self.sides:
-            parts = [self.cells[kind][selected] for kind, selected in self.groups[where].items()]
-        else:
-            parts = list(self.faces(where).values())
-        unique = np.unique(np.concatenate([part.ravel() for part in parts]))
-        return unique if self.piece is None else self.piece.everywhere(unique)
+        return selection.nodes(self, where)
 
     def cells_of(self, group: str | None) -> Mapping[str, Integers]:
         """Return the cells of a group.
@@ -701,18 +640,7 @@ class Mesh:
         MeshError
             There is no such group.
         """
-        if group is None:
-            return self.cells
-        if group not in self.groups:
-            allowed = ", ".join(self.groups) or "none"
-            raise MeshError(
-                f"no group {group!r}{did_you_mean(group, self.groups)}; there are {allowed}"
-            )
-        return {
-            kind: self.cells[kind][numbers]
-            for kind, numbers in self.groups[group].items()
-            if self.anywhere(len(numbers))
-        }
+        return selection.cells_of(self, group)
 
     def node_at(self, place: Array) -> int:
         """Return the number of the node at a place.
@@ -732,16 +660,7 @@ class Mesh:
         MeshError
             There is no node, with the nearest one in the message; or there are several.
         """
-        point = self._placed(place)
-        distance = np.linalg.norm(self.points - point, axis=1)
-        nearest = int(distance.argmin())
-        if distance[nearest] > _NEAR * self._size:
-            raise MeshError(
-                f"no node at {place_text(point)}; the nearest is number {nearest} at "
-                f"{place_text(self.points[nearest])}"
-            )
-        self._require_one(np.flatnonzero(distance <= _NEAR * self._size), point)
-        return nearest
+        return selection.node_at(self, place)
 
     def nodes_at(self, place: Array) -> Integers:
         """Return the node at a place with all copies that `split` made of it.
@@ -761,25 +680,7 @@ class Mesh:
         MeshError
             There is no node on any process, or there are nodes of several bodies.
         """
-        point = self._placed(place)
-        mask = np.linalg.norm(self.points - point, axis=1) <= _NEAR * self._size
-        nodes = np.flatnonzero(mask)
-        if self.piece is not None:
-            nodes = self.piece.everywhere(nodes)
-            if not self.anywhere(len(nodes)):
-                raise MeshError(f"no node at {place_text(point)}, in any part of the mesh")
-        elif self.numbers is None or not len(nodes):
-            return np.array([self.node_at(place)])
-        if len(np.unique(self.origin[nodes])) > 1:
-            self._require_one(nodes, point)
-        return nodes
-
-    def _require_one(self, nodes: Integers, point: Array) -> None:
-        if len(nodes) > 1:
-            raise MeshError(
-                f"{len(nodes)} nodes are at {place_text(point)}: name one by its number, "
-                f"{join_names(map(str, nodes))}, or a side of one body"
-            )
+        return selection.nodes_at(self, place)
 
     def locate(self, place: Array) -> tuple[Integers, Array]:
         """Return the nodes of the cell that contains a place, and their shape functions there.
@@ -801,7 +702,7 @@ class Mesh:
         MeshError
             The place lies outside the mesh.
         """
-        located = self.holding(self._placed(place)[None])
+        located = self.holding(selection.checked_place(self, place)[None])
         if not len(located.point):
             raise MeshError(f"{place_text(np.asarray(place))} lies outside the mesh")
         cell = CELLS[located.kinds[located.kind[0]]]
@@ -830,7 +731,7 @@ class Mesh:
         """
         points = np.asarray(places, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != self.dimension or not np.isfinite(points).all():
-            points = np.stack([self._placed(point) for point in points])
+            points = np.stack([selection.checked_place(self, point) for point in points])
         if group is None:
             return self._locator.holding(points)
         self.cells_of(group)
@@ -840,23 +741,15 @@ class Mesh:
         return self._locator.holding(points, masks)
 
     @cached_property
+    def tolerance(self) -> float:
+        """Distance up to which places are the same [mm]."""
+        return _NEAR * float(np.ptp(self.points, axis=0).max())
+
+    @cached_property
     def _locator(self) -> PointLocator:
         from softehl.runtime.mesh.point_location import PointLocator
 
-        return PointLocator(self.points, self.cells, _NEAR * self._size)
-
-    @cached_property
-    def _size(self) -> float:
-        return float(np.ptp(self.points, axis=0).max())
-
-    def _placed(self, coordinates: Array) -> Array:
-        """A place as an array, which may be given as a tuple.  Raises MeshError."""
-        if isinstance(coordinates, np.ma.MaskedArray) or np.asarray(coordinates).dtype == np.bool_:
-            raise MeshError(f"a place has {self.dimension} numbers, given {coordinates!r}")
-        point = np.asarray(coordinates, dtype=np.float64)
-        if point.shape != (self.dimension,) or not np.isfinite(point).all():
-            raise MeshError(f"a place has {self.dimension} coordinates, given {point.tolist()}")
-        return point
+        return PointLocator(self.points, self.cells, self.tolerance)
 
     def check(self) -> None:
         """Check that no cell is inverted, and that no cell or face of a side occurs twice.
@@ -866,19 +759,7 @@ class Mesh:
         MeshError
             With number and place of the cell.
         """
-        from softehl.runtime.mesh.checks import check
-
         check(self)
-
-    def _meant_faces(self, where: Predicate, name: str) -> Faces:
-        inside = _evaluate_predicate(where, self.points, name)
-        candidates = {
-            kind: faces[inside[faces].all(axis=1)] for kind, faces in self.boundary.items()
-        }
-        present = {kind: faces for kind, faces in candidates.items() if self.anywhere(len(faces))}
-        if not present:
-            raise MeshError(f"side {name!r}: no face of the boundary has all its nodes there")
-        return present
 
 
 def _lengths(name: str, size: Sequence[Any], dimension: int) -> tuple[float, ...]:
@@ -905,21 +786,3 @@ def _frozen(name: str, array: Any) -> NDArray[Any]:
 def _owned(arrays: Mapping[str, Any], context: str) -> Mapping[str, Any]:
     """Arrays by kind, none of which anybody can write to.  Raises MeshError."""
     return MappingProxyType({k: _frozen(f"{context}{k}", n) for k, n in arrays.items()})
-
-
-def _evaluate_predicate(where: Predicate, points: Array, name: str) -> Flags:
-    signature_error = misfit(where, "x")
-    if signature_error:
-        raise MeshError(f"{name}: {signature_error}, x of shape (n, dim)")
-    selected = np.asarray(where(points))
-    if selected.shape != (len(points),) or selected.dtype != np.bool_:
-        raise MeshError(
-            f"{name}: a predicate takes places of shape {points.shape} and gives booleans of shape "
-            f"({len(points)},); this one gave {selected.dtype} of shape {selected.shape}"
-        )
-    return selected
-
-
-def place_text(x: Array) -> str:
-    """Coordinates, for messages."""
-    return "(" + ", ".join(f"{value:.4g}" for value in x) + ")"

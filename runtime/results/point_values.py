@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from softehl.log import warn
 from softehl.runtime.arrays import Array
 from softehl.runtime.equations.interpolation import interpolate_nodal, interpolate_unknowns
-from softehl.runtime.mesh.mesh import MeshError, place_text
+from softehl.runtime.mesh.checks import place_text
+from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.suggestions import join_names
 
 if TYPE_CHECKING:

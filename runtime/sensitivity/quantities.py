@@ -13,7 +13,8 @@ from softehl.runtime.definition.problem_definition import RigidBody, StudyError
 from softehl.runtime.definition.rigid_bodies import component_of
 from softehl.runtime.equations.interpolation import interpolation_weights
 from softehl.runtime.equations.system import System
-from softehl.runtime.mesh.mesh import Mesh, MeshError, place_text
+from softehl.runtime.mesh.checks import place_text
+from softehl.runtime.mesh.mesh import Mesh, MeshError
 from softehl.runtime.sensitivity.linearised_step import LinearisedStep
 from softehl.runtime.sensitivity.tape import Tape
 from softehl.runtime.suggestions import did_you_mean, join_names
