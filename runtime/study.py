@@ -65,7 +65,8 @@ from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.parallel.engine import AnyEngine
 from softehl.runtime.parallel.linear_solver_choice import Linear
 from softehl.runtime.results.explanation import explain_at
-from softehl.runtime.results.result import Modes, Result
+from softehl.runtime.results.modes import Modes
+from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity.input_parsing import By
 from softehl.runtime.sensitivity.inputs import Key
 from softehl.runtime.sensitivity.quantities import UserFunction

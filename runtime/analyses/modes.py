@@ -8,7 +8,8 @@ from softehl.runtime.analyses.initial_state import initial_state
 from softehl.runtime.analyses.solver_options import SolverOptions
 from softehl.runtime.definition.problem_definition import ProblemDefinition, StudyError
 from softehl.runtime.equations.mass_matrix import Masses
-from softehl.runtime.results.result import Modes, Result
+from softehl.runtime.results.modes import Modes
+from softehl.runtime.results.result import Result
 from softehl.runtime.solve.solution import Point, Solution, Status
 
 _BALANCED = 1e-6

@@ -14,12 +14,18 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.argument_checks import writable
 from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.dofmap import AXES
+from softehl.runtime.equations.interpolation import at_every_node
 from softehl.runtime.io import replacing, write_text
-from softehl.runtime.mesh.cells import linear_pieces
+from softehl.runtime.mesh.cells import CELLS, linear_pieces
 from softehl.runtime.mesh.readers.meshio import import_meshio
 
 if TYPE_CHECKING:
     from softehl.runtime.equations.system import System
+    from softehl.runtime.results.result import Result
+
+
+Fields = Callable[[str], Mapping[str, Array]]
+"""Fields at the quadrature points of a block."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +48,7 @@ class VtuFields:
         cells: Mapping[str, Integers],
         nodal: Mapping[str, Array],
         blocks: Mapping[str, Block],
-        fields: Callable[[str], Mapping[str, Array]],
+        fields: Fields,
     ) -> VtuFields:
         """With the means of the fields, (cells, points), of blocks that stand on these cells."""
         rows = {kind: {tuple(r): k for k, r in enumerate(n.tolist())} for kind, n in cells.items()}
@@ -101,6 +107,28 @@ class VtuFields:
             "</VTKFile>",
         ]
         write_text(path, "\n".join(lines) + "\n")
+
+
+def write_result(result: Result, path: str | Path, local: Fields) -> None:
+    """See `Result.write`; local: fields of the elements of this process."""
+    system = result.system
+    if (target := write_target(path, system)).suffix == ".vtu":
+        write_file(target, system, _vtu_fields(result, system.everywhere, result.x, local))
+    else:
+        write_pieces(target, system, _vtu_fields(result, system, result.point.solution.x, local))
+
+
+def _vtu_fields(result: Result, system: System, x: Array, local: Fields) -> VtuFields:
+    """Of all unknowns x, or of those of this process with its own fields."""
+    nodal = at_every_node(system, x)
+    for name, block in system.everywhere.blocks.items():
+        if block.kernel.fields and CELLS[block.kind].dimension:
+            nodal |= {f"{name}.{label}": v for label, v in result.at_nodes(name).items()}
+    if system is system.everywhere:
+        cells, fields = system.mesh.cells, result.fields
+    else:
+        cells, fields = local_cells(system), local
+    return VtuFields.of(system.mesh.points, cells, nodal, system.blocks, fields)
 
 
 def write_target(path: str | Path, system: System) -> Path:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,22 +16,15 @@ from softehl.runtime.contact.pair_law import PairLawKernel, fields_of_law
 from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.eigenproblems import natural_modes
-from softehl.runtime.equations.interpolation import at_every_node
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.stability import negative_directions
 from softehl.runtime.kernels.constitutive_model import ModelKernel, PointState
 from softehl.runtime.kernels.explanation import Explanation
-from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.plotting import picture_file, show_or_save
 from softehl.runtime.results.explanation import block_called, explain_element
 from softehl.runtime.results.integrals import integral, mean
-from softehl.runtime.results.output import (
-    VtuFields,
-    local_cells,
-    write_file,
-    write_pieces,
-    write_target,
-)
+from softehl.runtime.results.modes import Modes
+from softehl.runtime.results.output import write_result
 from softehl.runtime.results.plotting import picture_of
 from softehl.runtime.results.point_values import point_values
 from softehl.runtime.results.reactions import motion_of, reactions, support_forces
@@ -800,22 +793,7 @@ class Result:
         Fields are named BLOCK.FIELD, at nodes as by `at_nodes` and in cells as means. Unknowns u_x,
         u_y, u_z are also written as a vector u. The file is complete at any moment.
         """
-        if (target := write_target(path, self.system)).suffix == ".vtu":
-            write_file(target, self.system, self._picture(self._global_system, self.x))
-        else:
-            write_pieces(target, self.system, self._picture(self.system, self.point.solution.x))
-
-    def _picture(self, system: System, x: Array) -> VtuFields:
-        """Of all unknowns x, or of those of this process with its own fields."""
-        nodal = at_every_node(system, x)
-        for name, block in self._global_system.blocks.items():
-            if block.kernel.fields and CELLS[block.kind].dimension:
-                nodal |= {f"{name}.{label}": v for label, v in self.at_nodes(name).items()}
-        if system is self._global_system:
-            cells, fields = system.mesh.cells, self.fields
-        else:
-            cells, fields = local_cells(system), self._local_fields
-        return VtuFields.of(system.mesh.points, cells, nodal, system.blocks, fields)
+        write_result(self, path, self._local_fields)
 
 
 class ModeShape(Result):
@@ -833,38 +811,3 @@ class ModeShape(Result):
 
     def _local_fields(self, block: str) -> dict[str, Array]:
         return {}
-
-
-@dataclass(frozen=True, eq=False)
-class Modes:
-    """Natural modes about a state, the lowest first; a sequence of their shapes.
-
-    Attributes
-    ----------
-    squares : array (k,)
-        Squares of the angular frequencies [1/s^2]; negative in unstable directions.
-    shapes : tuple of ModeShape
-        A Result for each, whose unknowns are the mode, of unit modal mass.
-    """
-
-    squares: Array
-    shapes: tuple[ModeShape, ...]
-
-    def __repr__(self) -> str:
-        """Summary in one line."""
-        return f"<Modes: frequencies {short_list(f'{f:.6g}' for f in self.frequencies)}>"
-
-    @property
-    def frequencies(self) -> Array:
-        """Frequencies (k,) [1/s]; nan in unstable directions."""
-        with np.errstate(invalid="ignore"):
-            return np.asarray(np.sqrt(self.squares) / (2.0 * np.pi))
-
-    def __len__(self) -> int:
-        return len(self.shapes)
-
-    def __getitem__(self, number: int) -> Result:
-        return self.shapes[number]
-
-    def __iter__(self) -> Iterator[Result]:
-        return iter(self.shapes)

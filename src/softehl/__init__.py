@@ -98,8 +98,9 @@ if TYPE_CHECKING:
     from softehl.runtime.mpi import MissingPetsc
     from softehl.runtime.parallel.matrix_free import MatrixFree
     from softehl.runtime.parallel.petsc import Petsc
+    from softehl.runtime.results.modes import Modes
     from softehl.runtime.results.plotting import animate
-    from softehl.runtime.results.result import Modes, ModeShape, Result
+    from softehl.runtime.results.result import ModeShape, Result
     from softehl.runtime.results.tensors import principal_values, von_mises
     from softehl.runtime.solve.arclength import Arclength
     from softehl.runtime.solve.continuation import Continuation, StepRule
@@ -163,7 +164,7 @@ _PUBLIC = {
     "MissingPetsc": "softehl.runtime.mpi",
     "MissingPyvista": "softehl.runtime.mesh.plotting",
     "ModeShape": "softehl.runtime.results.result",
-    "Modes": "softehl.runtime.results.result",
+    "Modes": "softehl.runtime.results.modes",
     "Motion": "softehl.runtime.analyses.motion",
     "Newmark": "softehl.runtime.analyses.time_integrators",
     "Newton": "softehl.runtime.solve.newton",
