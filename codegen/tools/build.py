@@ -5,7 +5,8 @@ and its SHA-256 stands beside it, so that a damaged one is never loaded.  Both a
 temporary names and moved into place: two builds at once do no harm.
 
 `python -m softehl.codegen.tools.build` compiles the kernels that ship, for the processor of this
-machine, into the user's cache (`codegen.tools.shipped_kernels`) and prints where they are.
+machine, into the user's cache and prints where they are. The runtime reads the path, so that
+solving imports nothing of the compiler.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ from softehl.codegen.tools import cache_store
 from softehl.system import processors
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
+_FAILED, _NO_COMPILER = 2, 3
+"""Exit codes of `main`."""
 COMMON = (
     *("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=fast", "-fPIC", "-shared"),
     *("-fno-tree-pre", "-Wno-ignored-optimization-argument"),
@@ -223,7 +226,30 @@ def _sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-if __name__ == "__main__":
-    from softehl.codegen.tools.shipped_kernels import main
+def main() -> int:
+    """Compile the kernels that ship; print the path of the library, or one line why there is none.
 
+    2: it failed. 3: there is no compiler.
+    """
+    from softehl.codegen.tools import kernel_cache
+    from softehl.codegen.tools.cache_dir import CacheError
+
+    try:
+        files = {p.name: p.read_text(encoding="utf-8") for p in GENERATED.glob("*.[ch]")}
+        print(kernel_cache.compiled(files, keep=True)[0] / LIBRARY)
+    except NoCompilerError as error:
+        return _failed(f"{error}", _NO_COMPILER)
+    except (BuildError, CacheError) as error:
+        return _failed(f"{error}", _FAILED)
+    except OSError as error:
+        return _failed(f"cannot write {error.filename}: {error.strerror or error}", _FAILED)
+    return 0
+
+
+def _failed(reason: str, code: int) -> int:
+    print(f"softehl: {reason}", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
     sys.exit(main())

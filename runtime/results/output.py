@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from softehl.runtime.results.result import Result
 
 
-Fields = Callable[[str], Mapping[str, Array]]
+Fields = Callable[[str], dict[str, Array]]
 """Fields at the quadrature points of a block."""
 
 

@@ -21,11 +21,11 @@ import pytest
 
 import softehl
 from softehl.cases import oring
+from softehl.cases.cli import unnamed_folder
 from softehl.cases.document import DOCS, renewed
 from softehl.cases.harness.case import load_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.observer import Observer
-from softehl.cases.harness.output_dir import unnamed_folder
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.harness.report.page import read_finished
 from softehl.cases.harness.run_record import table_digests

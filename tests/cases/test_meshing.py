@@ -9,13 +9,6 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from softehl.cases.seal.meshing.mesh_transfer import (
-    places_of,
-    transfer_boundary,
-    transfer_chain,
-    transfer_elements,
-    transfer_nodes,
-)
 from softehl.cases.seal.meshing.o_grid import Disc, disc_mesh
 from softehl.cases.seal.meshing.outline import (
     Arc,
@@ -32,6 +25,13 @@ from softehl.cases.seal.meshing.section_mesh import SectionMesh, corner_jacobian
 from softehl.cases.seal.meshing.section_mesher import Sizes, section_mesh
 from softehl.cases.seal.meshing.spacing import Spacing, Spot, graded
 from softehl.cases.seal.meshing.two_region_mesh import BODY, CAP, parted_mesh
+from softehl.cases.seal.solve.transfer import (
+    places_of,
+    transfer_boundary,
+    transfer_chain,
+    transfer_elements,
+    transfer_nodes,
+)
 from softehl.runtime.mesh.mesh import MeshError
 from tests.reference.calling import Part
 

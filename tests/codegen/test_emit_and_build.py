@@ -26,7 +26,7 @@ from softehl.codegen.graph.graph import Node
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import build, cli, output_files, shipped_kernels
+from softehl.codegen.tools import build, cli, output_files
 from softehl.runtime.kernels.kernel import (
     Kernel,
     MissingKernelsError,
@@ -109,7 +109,7 @@ def test_a_missing_compiler(
         build.build(tmp_path)
     assert list(tmp_path.iterdir()) == []
     before = {p.name: p.stat().st_mtime_ns for p in build.GENERATED.iterdir()}
-    assert shipped_kernels.main() == 2
+    assert build.main() == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert printed.err.startswith("softehl: no C compiler: 'no-such-compiler' is not on the PATH")

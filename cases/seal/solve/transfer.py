@@ -9,6 +9,10 @@ The contact of a film is known on both meshes. The change from contact to film i
 small and smooth where the state itself is not, as in the corners of a groove. A gap of a micrometre
 does not survive that, so the film thickness is carried by itself, ln h over the place on the arc,
 and the change of it is spread into the body.
+
+Nodal values go through the cells inside, values of the boundary by place along it. A point gets the
+value of the cell that it lies in, so that nothing crosses a mouth. With cubic splines through the
+nodes around each cell, films of an O-ring, an X-ring and a U-cup took as many iterations.
 """
 
 from __future__ import annotations
@@ -21,17 +25,16 @@ from scipy.interpolate import PchipInterpolator
 
 from softehl.cases.seal.equations.system import SealSystem
 from softehl.cases.seal.meshing.mesh_morphing import potential
-from softehl.cases.seal.meshing.mesh_transfer import (
-    transfer_boundary,
-    transfer_chain,
-    transfer_elements,
-    transfer_nodes,
-)
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
 from softehl.cases.seal.solve.contact_stages import contact_problem, correction_stage
 from softehl.cases.seal.solve.correctors import lagged
 from softehl.cases.seal.solve.load_stages import Stage
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.discretisation.quadrature import lagrange, pressure_nodes
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.point_location import Located, PointLocator
+
+_WITHIN = 1e-12  # of the size of the mesh: a point so near to a cell is in it
 
 
 def carried_contact(
@@ -144,3 +147,57 @@ def modes_at(old_positions: Array, nodes: Array, at: Array) -> tuple[Integers, A
     local = 2.0 * (at - old_positions[segment]) / np.diff(old_positions)[segment] - 1.0
     modes = lagrange(nodes, np.clip(local.ravel(), -1.0, 1.0))[:, :, 0]
     return segment, modes.reshape(*segment.shape, -1)
+
+
+def transfer_nodes(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
+    """Nodal values (V', k) on the new mesh from those, (V, k), on the old: bilinear."""
+    located = _nearest(old, new.points)
+    weights = CELLS["quad4"].shape(located.parent[:, :2])
+    return np.asarray(np.einsum("na,nak->nk", weights, values[old.quads[located.row]]))
+
+
+def transfer_elements(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
+    """Element values (Q',) on the new mesh from those, (Q,), on the old, by their middles."""
+    return np.asarray(values[_nearest(old, new.points[new.quads].mean(axis=1)).row])
+
+
+def _nearest(mesh: SectionMesh, points: Array) -> Located:
+    """The cell that holds each place (n, 2), or is nearest to it."""
+    tolerance = _WITHIN * float(np.ptp(mesh.points, axis=0).max())
+    return PointLocator(mesh.points, {"quad4": mesh.quads}, tolerance).nearest(points)
+
+
+def transfer_boundary(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
+    """Values (B',) at the whole boundary of the new mesh from those, (B,), of the old, by place.
+
+    Shape preserving: no value beyond its neighbours.
+    """
+    period = old.length
+    at = np.concatenate([old.positions - period, old.positions, old.positions + period])
+    positions = old.positions[0] + np.mod(
+        new.positions * (period / new.length) - old.positions[0], period
+    )
+    return np.asarray(PchipInterpolator(at, np.tile(values, 3))(positions))
+
+
+def transfer_chain(
+    old: SectionMesh, new: SectionMesh, nodes: Integers, new_nodes: Integers, values: Array
+) -> Array:
+    """Values (n',) at new_nodes of the boundary from those, (n,), at nodes, by place.
+
+    Both run counterclockwise without gaps. Shape preserving; beyond the old nodes as at their ends.
+    """
+    at = places_of(old, nodes)
+    positions = places_of(new, new_nodes) * (old.length / new.length)
+    turns = np.round((0.5 * (at[0] + at[-1]) - 0.5 * (positions[0] + positions[-1])) / old.length)
+    positions = np.clip(positions + turns * old.length, at[0], at[-1])
+    return np.asarray(PchipInterpolator(at, values)(positions))
+
+
+def places_of(mesh: SectionMesh, nodes: Integers) -> Array:
+    """Places (n,) of boundary nodes that run counterclockwise, mm, rising."""
+    index = np.full(len(mesh.points), -1, dtype=np.int64)
+    index[mesh.boundary] = np.arange(len(mesh.boundary))
+    at = mesh.positions[index[nodes]]
+    back = np.concatenate([[0], np.cumsum(np.diff(at) < 0.0)])
+    return np.asarray(at + back * mesh.length)
