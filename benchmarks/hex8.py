@@ -28,7 +28,7 @@ from softehl.runtime.arrays import Array
 
 AGREEMENT = 1e-12
 SAMPLES = 7
-ASSEMBLED = ("ngsolve", "felupe", "dolfinx")
+ASSEMBLED = ("torchfem", "mfem", "ngsolve", "felupe", "dolfinx")
 """Programs that assemble; the others give arrays of elements."""
 
 

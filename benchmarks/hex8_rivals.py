@@ -93,11 +93,15 @@ def tatva(n):
 
 
 def warp(n):
-    """Arrays of elements: a kernel of the residual by hand, and its tangent by hand."""
+    """Arrays of elements: a kernel of the residual by hand, and its tangent by hand.
+
+    Loops stay loops and no adjoint is made: else it compiles for more than three minutes.
+    """
     import warp as wp
 
     wp.config.quiet = True
     wp.init()
+    wp.set_module_options({"enable_backward": False, "max_unroll": 3})
     x, cells = cube(n)
     dN = wp.array(shape_gradients().reshape(64, 3), dtype=wp.vec3d, device="cpu")
     X = wp.array(mapped(x)[cells].reshape(-1, 3), dtype=wp.vec3d, device="cpu")
@@ -156,6 +160,72 @@ def warp(n):
         return R.numpy(), blocks
 
     return of_elements(x, cells, evaluate)
+
+
+def torchfem(n):
+    """Assembled: its hyperelastic solid, of which it differentiates the energy."""
+    import torch
+    from torchfem import Solid
+    from torchfem.materials import Hyperelastic3D
+
+    torch.set_num_threads(1)
+    torch.set_default_dtype(torch.float64)
+    x, cells = cube(n)
+
+    def energy(F, parameters):
+        J = torch.linalg.det(F)
+        mu, bulk = parameters
+        return mu / 2 * (J ** (-2 / 3) * (F * F).sum() - 3) + bulk / 2 * (J - 1) ** 2
+
+    material = Hyperelastic3D(energy, [MU, K]).vectorize(len(cells))
+    body = Solid(torch.tensor(mapped(x)), torch.tensor(cells), material)
+    body.K = torch.empty(0)
+    u, none = torch.tensor(displacement(x)), torch.empty(0, dtype=torch.int64)
+    zeros = torch.zeros(body.n_int, body.n_elem, 3, 3)
+    start = (torch.zeros_like(u), zeros + torch.eye(3), zeros, zeros[:, :, :0, 0], u, zeros[0], 0)
+
+    def evaluate():
+        k, f, *_ = body.integrate_material(*start)
+        return body.assemble_rhs(f), body.assemble_matrix(k, none)
+
+    def results():
+        r, A = evaluate()
+        product = A @ torch.tensor(direction(x)).ravel()
+        return r.numpy().reshape(-1, 3), product.numpy().reshape(-1, 3)
+
+    return x, evaluate, results
+
+
+def mfem(n):
+    """Assembled: its neo-Hooke in a nonlinear form, whose gradient is a sparse matrix."""
+    import mfem.ser as mf
+
+    mesh = mf.Mesh.MakeCartesian3D(n, n, n, mf.Element.HEXAHEDRON, 1.0, 1.0, 1.0, False)
+    mesh.SetCurvature(1, False, 3, mf.Ordering.byVDIM)
+    nodes = mesh.GetNodes().GetDataArray()
+    x = nodes.reshape(-1, 3).copy()
+    nodes[:] = mapped(x).ravel()
+    collection = mf.H1_FECollection(1, 3)
+    space = mf.FiniteElementSpace(mesh, collection, 3, mf.Ordering.byVDIM)
+    model = mf.NeoHookeanModel(MU, K)
+    integrator = mf.HyperelasticNLFIntegrator(model)
+    integrator.SetIntRule(mf.IntRules.Get(mf.Geometry.CUBE, 3))
+    form = mf.NonlinearForm(space)
+    form.AddDomainIntegrator(integrator)
+    moved = mf.Vector((mapped(x) + displacement(x)).ravel())
+    r, v, product = (mf.Vector(a.ravel()) for a in (0 * x, direction(x), 0 * x))
+
+    def evaluate():
+        form.Mult(moved, r)
+        return form.GetGradient(moved)
+
+    def results():
+        evaluate().Mult(v, product)
+        # what is in MFEM's hands lives as long as these results
+        results.kept = mesh, collection, space, model, integrator
+        return tuple(a.GetDataArray().reshape(-1, 3).copy() for a in (r, product))
+
+    return x, evaluate, results
 
 
 def ngsolve(n):
@@ -260,7 +330,8 @@ def dolfinx(n):
     return x, evaluate, results
 
 
-TOOLS = {f.__name__: f for f in (jax, tatva, warp, ngsolve, felupe, dolfinx)}
+PROGRAMS = (jax, tatva, warp, torchfem, mfem, ngsolve, felupe, dolfinx)
+TOOLS = {f.__name__: f for f in PROGRAMS}
 
 
 def main(tool, n, file):

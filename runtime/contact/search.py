@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.contact.mortar_overlap import CORNER, common_part, mean_normal
 from softehl.runtime.contact.mortar_pair import MULTIPLIERS, MortarPairKernel
-from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.assembly import Memo
 from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.discretisation.sparsity import Structure
@@ -292,11 +292,10 @@ class ContactProblem(Problem):
             return self.latest[0]
         new = {block.name: block for block in blocks_at_x}
         blocks = tuple(new.get(b.name, b) for b in self.assembler.blocks)
-        size = self.assembler.size
-        structure = Structure(size, tuple(b.dofs for b in blocks))
+        structure = Structure(self.assembler.size, tuple(b.dofs for b in blocks))
         if last is not None and all(_alike(b, last.block(b.name)) for b in blocks_at_x):
             structure = last.structure
-        assembler = Assembler(size, blocks, structure)
+        assembler = replace(self.assembler, blocks=blocks, structure=structure, memo=Memo())
         arguments = {f.name: getattr(self, f.name) for f in fields(Problem)}
         self.latest[:] = [Problem(**{**arguments, "assembler": assembler})]
         return self.latest[0]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 from softehl.runtime.arrays import Array
@@ -33,7 +32,7 @@ from softehl.runtime.discretisation.p_multigrid import MultigridLevels
 from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.newton import EvolvingProblem, Newton
 from softehl.runtime.suggestions import join_names
 
 PRECISIONS = ("double", "mixed")
@@ -181,17 +180,19 @@ class _MatrixFreeCommunicator(Communicator):
     def distribute(self, problem: Problem) -> MatrixFreeProblem:
         """See `Communicator`."""
         there = self.backend.problem(problem, self.levels)
-        return MatrixFreeProblem(there, self.levels, self.iteration, self.backend)
+        ties = TieForces.of(there, self.levels)
+        return MatrixFreeProblem(there, self.levels, self.iteration, self.backend, ties)
 
 
 @dataclass(frozen=True, eq=False)
 class MatrixFreeProblem:
-    """A problem with a matrix-free tangent."""
+    """A problem with a matrix-free tangent; ties: of all its states."""
 
     problem: Problem
     levels: MultigridLevels
     iteration: KrylovSettings
     backend: Backend
+    ties: TieForces
 
     @property
     def equations(self) -> Problem:
@@ -213,13 +214,15 @@ class MatrixFreeProblem:
         return self.problem.fields(name, x)
 
     def at(self, x: Array) -> MatrixFreeProblem:
-        """See `Problem`: it has no elements that are sought."""
-        return self
+        """See `Problem`."""
+        there = self.problem.at(x)
+        return self if there is self.problem else replace(self, problem=there)
 
-    @cached_property
-    def ties(self) -> TieForces:
-        """Ties of all its steps."""
-        return TieForces.of(self.problem, self.levels)
+    def after(self, previous: Array, x: Array) -> MatrixFreeProblem:
+        """See `EvolvingProblem`."""
+        if not isinstance(self.problem, EvolvingProblem):
+            return self
+        return replace(self, problem=self.problem.after(previous, x))
 
     def residual(self, x: Array) -> Array:
         """See `Problem`."""
@@ -227,7 +230,7 @@ class MatrixFreeProblem:
 
     def linearise(self, x: Array) -> tuple[Array, MatrixFreeOperator]:
         """See `Problem`."""
-        problem = self.problem
+        problem = self.problem.at(x)
         r = problem.assembler.residual(x, problem.parameters)
         tangent = MatrixFreeOperator.of(
             problem, self.levels, self.iteration, self.ties, x, self.backend

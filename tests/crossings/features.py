@@ -6,14 +6,14 @@ The body is a block 2 x 1 (x 1), held on its left side. `Problem.study` writes i
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
-from softehl import Kernel, Mesh, Study, initial_weights, load_kernel
+from softehl import Kernel, MatrixFree, Mesh, SolverOptions, Study, initial_weights, load_kernel
 from softehl.runtime.arrays import Array
 from softehl.runtime.results.result import Result
 from tests.crossings import pages
@@ -101,6 +101,15 @@ class Law:
         else:
             source = self.page if again else self.kernel(kind, study.geometry)
             study.add(name, source, cells=cells, **given)
+
+    @cached_property
+    def offering(self) -> Law:
+        """The law with products by sum factorisation; the law itself where it is given by name."""
+        source = self.material if self.page is None else self.page
+        if isinstance(source, str) or self.page is pages.product:
+            return self
+        page = source.page() if self.page is None else source
+        return replace(self, page=pages.offering(page), material=None)
 
     @cache  # noqa: B019
     def kernel(self, cell: str, geometry: str | None) -> Kernel:
@@ -244,12 +253,14 @@ def _weight(study: Study, at: Problem) -> None:
     named = zip(at.axes, force, strict=True)
     given: Any = {f"w{name[1:]}": _grown(at.ramp, f) for name, f in named}
     (kind,) = study.mesh.cells
-    study.add("weight", _weight_kernel(kind, study.geometry), **given)
+    products = at.solver in WITHOUT_MATRIX
+    study.add("weight", _weight_kernel(kind, study.geometry, products), **given)
 
 
 @cache
-def _weight_kernel(cell: str, geometry: str | None) -> Kernel:
-    return load_kernel(pages.weight, cell=cell, geometry=geometry)
+def _weight_kernel(cell: str, geometry: str | None, products: bool) -> Kernel:
+    page = pages.offering(pages.weight) if products else pages.weight
+    return load_kernel(page, cell=cell, geometry=geometry)
 
 
 def _grown(ramp: Ramp, size: float) -> Callable[[float], float]:
@@ -303,8 +314,14 @@ CONSTRAINTS: dict[str, Callable[[Study, Problem], None]] = {
 GEOMETRIES = {"plane strain": None, "axisymmetric": "axisymmetric"}
 """Name -> argument of `Study`; a body in 3-D is neither."""
 
-SOLVERS = ("auto", "superlu", "amg", "matrix-free")
-"""Values of `linear`."""
+DEVICE = {"emulated": "double", "mixed precision": "mixed"}
+"""Solvers on an emulated device: precision of their multigrid."""
+
+SOLVERS = ("auto", "superlu", "amg", "matrix-free", *DEVICE)
+"""Values of `linear`, and solvers on a device."""
+
+WITHOUT_MATRIX = ("matrix-free", *DEVICE)
+"""Solvers for which a law must offer products."""
 
 
 @dataclass(frozen=True)
@@ -358,12 +375,16 @@ class Problem:
     @property
     def options(self) -> dict[str, Any]:
         """Arguments of an analysis: the linear solver."""
+        if self.solver in DEVICE:
+            engine = MatrixFree(device="emulated", precision=DEVICE[self.solver])
+            return {"options": SolverOptions(engine=engine)}
         return {} if self.solver == "auto" else {"linear": self.solver}
 
     @property
     def properties(self) -> Law:
-        """Of the law."""
-        return LAWS[self.law]
+        """Of the law; with products where the solver needs them."""
+        law = LAWS[self.law]
+        return law.offering if self.solver in WITHOUT_MATRIX else law
 
     @property
     def steps(self) -> int:
@@ -526,7 +547,12 @@ ALIKE: dict[str, dict[str, tuple[str, ...]]] = {
         "rigid side": (),
     },
     "geometry": {"plane strain": (), "axisymmetric": ()},
-    "solver": {"auto": ("superlu",), "amg": (), "matrix-free": ()},
+    "solver": {
+        "auto": ("superlu",),
+        "amg": (),
+        "matrix-free": (),
+        "emulated": ("mixed precision",),
+    },
     "analysis": {
         "solve": ("many steps",),
         "start": (),

@@ -2,6 +2,8 @@
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
+from typing import Any
+
 import sympy as sp
 
 import softehl
@@ -186,3 +188,15 @@ def product(m):
     """The body by its energy, with products by sum factorisation."""
     _minimised(m)
     m.offer(product=True)
+
+
+def offering(source: Any) -> Any:
+    """A page with products by sum factorisation."""
+
+    @softehl.page
+    def offered(m):
+        """See the page."""
+        source.write(m)
+        m.offer(product=True)
+
+    return offered

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tests.crossings.features import ANALYSES, March, Problem
+from tests.crossings.features import ANALYSES, DEVICE, LAWS, WITHOUT_MATRIX, March, Problem
 
 
 def _moves(at: Problem) -> bool:
@@ -31,6 +31,19 @@ def _rigid(at: Problem) -> bool:
     return at.constraint == "rigid side"
 
 
+def _products(at: Problem) -> bool:
+    """Whether the solver needs products."""
+    return at.solver in WITHOUT_MATRIX
+
+
+def _has_no_product(at: Problem) -> bool:
+    """Whether law or cell have no product by sum factorisation."""
+    if not at.cell.startswith(("quad", "hex")) or at.cell in ("quad8", "hex20"):
+        return True
+    named = at.properties is LAWS[at.law] and at.law != "product"
+    return named or at.law in ("softened", "mixed", "condensed")
+
+
 Row = tuple[tuple[str, ...], Callable[[Problem], bool], str]
 """Relations, condition, message."""
 
@@ -39,9 +52,7 @@ REFUSED: tuple[Row, ...] = (
     (("large ring",), lambda at: at.law == "unit cells", "in plane strain"),
     (
         (),
-        lambda at: (
-            at.law == "unit cells" and at.solver == "matrix-free" and at.analysis != "follow"
-        ),
+        lambda at: at.law == "unit cells" and _products(at) and at.analysis != "follow",
         "MatrixFree does not solve",
     ),
     (
@@ -49,9 +60,14 @@ REFUSED: tuple[Row, ...] = (
         lambda at: at.law == "unit cells" and not _moves(at),
         "through which nothing is differentiated",
     ),
+    ((), lambda at: at.solver in DEVICE and at.analysis == "follow", "follow takes no engine"),
     ((), lambda at: at.solver == "matrix-free" and at.analysis == "follow", "it factorises"),
     ((), lambda at: at.solver == "amg" and at.analysis == "follow", "it factorises"),
-    ((), lambda at: at.solver == "matrix-free" and at.law != "product", "no product by sum"),
+    ((), lambda at: _products(at) and _has_no_product(at), "no product by sum"),
+    ((), lambda at: at.solver in DEVICE and at.law == "learned", "a device knows"),
+    (("contact",), _products, "no product by sum"),
+    (("rigid surface",), _products, "rule of its own"),
+    ((), lambda at: _products(at) and _moves(at), "inertia has no such products"),
     (("sensitivity", "hessian"), _moves, "has no derivatives"),
     (
         ("sensitivity", "hessian"),
@@ -61,7 +77,7 @@ REFUSED: tuple[Row, ...] = (
     ((), _again, "prescribed twice"),
     ((), lambda at: _rigid(at) and at.load == "prescribed", "moves with the rigid body"),
     ((), lambda at: _rigid(at) and at.solver == "amg", "multigrid needs"),
-    ((), lambda at: _rigid(at) and at.solver == "matrix-free", "no product by sum"),
+    ((), lambda at: _rigid(at) and _products(at), "no product by sum"),
     ((), lambda at: _rigid(at) and at.analysis == "explicit", "grip:.* has no mass everywhere"),
     ((), lambda at: _rigid(at) and at.analysis == "newmark", "is a multiplier, whose error"),
     (("hessian",), lambda at: at.load == "weight", "comes as C without second derivatives"),

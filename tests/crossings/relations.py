@@ -20,7 +20,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.mesh import Predicate
 from softehl.runtime.mesh.readers.meshio import import_meshio
 from softehl.runtime.results.result import Result
-from tests.crossings.features import FAST, LAWS, SIZE, Problem
+from tests.crossings.features import FAST, GEOMETRIES, LAWS, SIZE, WITHOUT_MATRIX, Problem
 from tests.runtime.contact_laws import cohesion
 
 Pairs = Iterator[tuple[Array | float, Array | float]]
@@ -139,15 +139,21 @@ def renumbered(at: Problem) -> Pairs:
 
 def grouped(at: Problem) -> Pairs:
     """Two groups of cells with one law are one body."""
+    result, known = in_groups(at), at.run()
+    yield displacements(result), displacements(known)
+
+
+def in_groups(at: Problem, factor: float = 1.0) -> Result:
+    """The state of two groups of cells; factor: of a constant of the second one."""
     middle = at.mesh().points[:, 0].mean()
     mesh = at.mesh().with_group("near", lambda x: x[:, 0] < middle)
     mesh = mesh.with_group("far", lambda x: x[:, 0] >= middle)
-    study = Study(mesh)
-    for name in ("near", "far"):
-        at.properties.add(study, name, name)
+    study = Study(mesh, geometry=GEOMETRIES[at.geometry])
+    parameter, given = at.properties.parameter, at.properties.given
+    at.properties.add(study, "near", "near")
+    at.properties.add(study, "far", "far", **{parameter: factor * given[parameter]})
     at.hold(study)
-    result, known = replace(at, bodies=("near", "far")).run(study), at.run(at.study(mesh))
-    yield displacements(result), displacements(known)
+    return replace(at, bodies=("near", "far")).run(study)
 
 
 def tied(at: Problem) -> Pairs:
@@ -191,6 +197,13 @@ def one_body(at: Problem) -> Pairs:
     """All ways to write the body give one state."""
     result, known = at.run(), replace(at, law="energy", solver="auto").run()
     yield displacements(result), displacements(known)
+
+
+def without_matrix(at: Problem) -> Pairs:
+    """A solver that needs products finds the state of one that factorises, in two regions."""
+    result, known = (in_groups(a, 3.0) for a in (at, replace(at, solver="auto")))
+    yield displacements(result), displacements(known)
+    yield force(result, "left"), force(known, "left")
 
 
 def condensed(at: Problem) -> Pairs:
@@ -501,6 +514,15 @@ RELATIONS: dict[str, Relation] = {
         looser={"midpoint": 1e-2, "explicit": 1e-5},
         of=lambda at: at.law in ONE_BODY,
     ),
+    "without a matrix": Relation(
+        without_matrix,
+        ("solver", "law", "load", "constraint", "analysis", "geometry"),
+        (("law", "solver"),),
+        base=replace(Problem(), solver="emulated"),
+        quick=("solver", "constraint"),
+        tolerance=1e-9,
+        of=lambda at: at.solver in WITHOUT_MATRIX,
+    ),
     "condensed": Relation(
         condensed,
         ("cell", "load", "constraint", "analysis", "geometry"),
@@ -556,7 +578,7 @@ RELATIONS: dict[str, Relation] = {
     ),
     "restart": Relation(
         restarted,
-        ("law", "load", "constraint"),
+        ("law", "load", "constraint", "solver"),
         base=replace(Problem(), analysis="bdf2"),
         quick=("law",),
         tolerance=1e-14,
@@ -576,7 +598,8 @@ RELATIONS: dict[str, Relation] = {
         (("law", "constraint"),),
         quick=("law", "constraint"),
         tolerance=1e-12,
-        of=lambda at: at.load != "pressure",  # it has no energy
+        # a pressure has no energy, and without a matrix there are no factors
+        of=lambda at: at.load != "pressure" and at.solver not in WITHOUT_MATRIX,
     ),
     "frequencies": Relation(
         frequencies,

@@ -95,7 +95,12 @@ def one_lane(text: str) -> str:
         count += 1
         return f"const V operands{count}[] = {{{m[3]}}};\n    {m[1]}({m[2]}operands{count}{m[4]}"
 
-    return operands.sub(named, text).replace("const double", "const V")
+    return operands.sub(named, text)
+
+
+def of_reals(text: str) -> str:
+    """`one_lane` in the precision of the kernels; routines for one point stay in double."""
+    return one_lane(text).replace("const double", "const V")
 
 
 def single_precision(text: str) -> str:
@@ -195,7 +200,7 @@ class DeviceKernels(BlockSizes):
         lines = {f"to{order}": SymmetricTable(self._shape(order)[0], 1) for order in orders}
         lines["slope"] = SymmetricTable(tables["slope"], -1)
         texts = [
-            one_lane(sweep(f"{abi.function_name(stem, label)}_{kind}", table, kind))
+            of_reals(sweep(f"{abi.function_name(stem, label)}_{kind}", table, kind))
             for label, table in lines.items()
             for kind in ("forth", "back")
         ]
@@ -208,7 +213,7 @@ class DeviceKernels(BlockSizes):
         texts += simd_printer.wrappers("".join([*routines, *functions]))
         if called:
             texts += [one_lane(t) for t in (c_runtime.LOCAL, *routines)]
-        texts += map(one_lane, functions)
+        texts += map(of_reals, functions)
         weights = ", ".join(number(float(w)) for w in tables["weights"])
         texts.append(f"TABLE V weights[{self.q}] = {{{weights}}};\n")
         for order in sorted({f.order for at in self.orders for f in self._assembled(at)}):
