@@ -615,7 +615,7 @@ def test_a_cup_is_named_by_bore_groove_and_width() -> None:
     assert p.inner_diameter < -40.0  # free lips are wider than the bore
 
 
-# --- Every tenth of 300 random O-rings up to three shear moduli -----------------------------------
+# --- Every twentieth of 300 random O-rings up to three shear moduli -------------------------------
 
 
 MODULI = 3.0
@@ -632,16 +632,16 @@ def are_found(states: list[dict[str, Any]]) -> bool:
     return all(s["verdict"] == OK or s["advice"].startswith("friction ") for s in states)
 
 
-TENTH = [number for number in range(0, 300, 10) if pressed(number) <= MODULI]
+DRAWN = [number for number in range(10, 300, 20) if pressed(number) <= MODULI]
 
 
-def test_a_tenth_of_the_sample_is_what_its_page_says() -> None:
-    assert len(TENTH) == 21
+def test_the_sample_is_what_its_page_says() -> None:
+    assert len(DRAWN) == 11
     assert sum(pressed(number) <= MODULI for number in range(300)) == 184
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", TENTH)
+@pytest.mark.parametrize("number", DRAWN)
 def test_every_film_of_a_drawn_gland_is_found(number: int) -> None:
     found = solved_sample(number, limit=200.0)
     assert found["message"] == ""

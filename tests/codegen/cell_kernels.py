@@ -45,7 +45,7 @@ class CellKernels:
         self.function(task)(*pointers, None, None, None)
 
 
-def cell_kernels(d: Definition, directory: Path, flags: Sequence[str] = ("-O1",)) -> CellKernels:
+def cell_kernels(d: Definition, directory: Path, flags: Sequence[str] = ("-O0",)) -> CellKernels:
     """Compile the one file of target `ufcx`, alone, without a warning."""
     source = directory / f"{d.name}_ufcx.c"
     files = output_files.ufcx_files([pipeline.compile_model(d, Target.UFCX)])

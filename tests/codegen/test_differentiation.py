@@ -454,7 +454,7 @@ def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = [pipeline.compile_model(m.finish(), Target.SIMD) for m in models]
     for name, text in output_files.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
-    build.build(folder, extra=(*build.STRICT, "-O1"))
+    build.build(folder, extra=(*build.STRICT, "-O0"))
     return folder
 
 
@@ -630,7 +630,7 @@ def undefined_kernels(
     made = [pipeline.compile_model(m.finish(), request.param) for m in models]
     for name, text in output_files.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
-    build.build(folder, extra=(*build.STRICT, "-O1"))
+    build.build(folder, extra=(*build.STRICT, "-O0"))
     return folder
 
 

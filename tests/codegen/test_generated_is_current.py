@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from softehl.codegen import pipeline
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import cli, cost_table
+from softehl.codegen.tools import cli, cost_table, output_files
 from softehl.codegen.tools.build import GENERATED
 
 DIGEST = """
@@ -31,6 +32,7 @@ for name, text in files.items():
     print(name, hashlib.sha256(text.encode()).hexdigest())
 """
 REMEDY = "mend it with: softehl generate"
+FEW = ("solid_q4", "film_conserving", "contact")
 
 
 def generated_under(seed: str, directory: Path = GENERATED.parent / "src") -> dict[str, str]:
@@ -52,14 +54,17 @@ def digests() -> dict[str, str]:
     return {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
 
 
-def test_generated_files_are_current(capsys: pytest.CaptureFixture[str]) -> None:
-    code = cli.generate(check=True)
-    assert capsys.readouterr().err == ""
-    assert code == 0
+def test_some_generated_files_are_current() -> None:
+    """Of a rubber, a film and a contact; the slow test generates all, which takes half a minute."""
+    made = output_files.files(pipeline.compile_model(ALL[name]()) for name in FEW)
+    kernels = {name: text for name, text in made.items() if name.startswith(FEW)}
+    assert len(kernels) >= len(FEW)
+    stale = [n for n, text in kernels.items() if (GENERATED / n).read_text("utf-8") != text]
+    assert stale == [], REMEDY
 
 
 @pytest.mark.slow
-def test_the_text_is_the_same_under_another_seed_and_from_another_directory(tmp_path: Path) -> None:
+def test_the_text_is_current_under_another_seed_and_from_another_directory(tmp_path: Path) -> None:
     skipped = shutil.ignore_patterns("__pycache__", "cases", "runtime")
     shutil.copytree(GENERATED.parent / "src", tmp_path / "elsewhere", ignore=skipped)
     assert generated_under("0") == digests()

@@ -91,7 +91,7 @@ def family(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Definiti
     texts = output_files.files([pipeline.compile_model(d) for d in models.values()])
     for name, text in texts.items():
         (directory / name).write_text(text, encoding="utf-8")
-    build.build(directory, extra=(*build.STRICT, "-O1"))
+    build.build(directory, extra=(*build.STRICT, "-O0"))
     return {name: (d, load_kernel(name, directory)) for name, d in models.items()}
 
 

@@ -79,7 +79,7 @@ def made(d: Definition, folder: Path) -> tuple[str, Path]:
     for name, content in output_files.files([pipeline.compile_model(d)]).items():
         (folder / name).write_text(content, encoding="utf-8")
         text += content
-    build.build(folder, extra=(*build.STRICT, "-O1"))
+    build.build(folder, extra=(*build.STRICT, "-O0"))
     return text, folder / build.LIBRARY
 
 

@@ -270,7 +270,7 @@ def comparisons(pages: Sequence[tuple[RandomPage, Definition]], folder: Path) ->
     made = [pipeline.compile_model(d) for _, d in pages]
     for name, text in output_files.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
-    build.build(folder, extra=(*build.STRICT, "-O1"))
+    build.build(folder, extra=(*build.STRICT, "-O0"))
     return [
         Comparison(load_kernel(d.name, folder), Meaning(page, (), d.rule.rows()), random.Random(7))
         for page, d in pages
@@ -464,7 +464,7 @@ def compiled(models: Sequence[Nested], target: Target, folder: Path) -> None:
     made = [pipeline.compile_model(m.definition(), target) for m in models]
     for name, text in output_files.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
-    build.build(folder, extra=(*build.STRICT, "-O1"))
+    build.build(folder, extra=(*build.STRICT, "-O0"))
 
 
 def checked(model: Nested, folder: Path, seed: int, states: int = 8) -> int:

@@ -120,8 +120,8 @@ def write(d: Definition, directory: Path) -> None:
         (directory / name).write_text(text, encoding="utf-8")
 
 
-def compiled(d: Definition, directory: Path, level: str = "-O1") -> Kernel:
-    """The kernel of a throw-away model, compiled with little optimisation (it is faster)."""
+def compiled(d: Definition, directory: Path, level: str = "-O0") -> Kernel:
+    """The kernel of a throw-away model, compiled without optimisation (a quarter of the time)."""
     write(d, directory)
     build.build(directory, extra=(*build.STRICT, level))
     return load_kernel(d.name, directory)
