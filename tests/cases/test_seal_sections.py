@@ -216,6 +216,37 @@ def test_two_contacts_that_carry_different_fluxes_are_not_believed() -> None:
     assert 'cavitation = "mass-conserving"' in apart.advice
 
 
+def _two_lobes(h_star: float, lobe: tuple[float, float], groove: float) -> FilmNumbers:
+    """A film at +100 mm/s, 10 MPa: h*, um; p_max and least h, um, of the first lobe; groove."""
+    q = 0.05 * h_star
+    film = FilmNumbers(100.0, q, 1e-3 * h_star, 1e-3, 12.5, 1.0, 1e-8, 0.0, 0.03, 14.0)
+    sealed = ContactNumbers(q, lobe[0], 1e-3 * lobe[1], -0.9, -0.3, 10.0)
+    air = ContactNumbers(q, 12.5, 3e-4, 0.9, 2.0, groove)
+    return replace(film, contacts=(sealed, air))
+
+
+def test_a_lobe_that_is_lifted_though_it_may_seal_is_told() -> None:
+    """Both films of the X-ring AS568-210 on 19 at 10 MPa (docs/validation/sections.md)."""
+    verdict = Verdict(13.5, references=(12.0, 13.5), judge_slopes=True)
+    sealing, lifted = (
+        _two_lobes(0.6186, (11.55, 0.479), 10.62),
+        _two_lobes(0.778, (11.03, 1.56), 11.04),
+    )
+    assert verdict.after(sealing).word == OK
+    told = verdict.after(lifted)
+    assert told.word == "uncertain"
+    assert "lifts the contact on the sealed side" in told.advice
+    # oil under more pressure than the dry lobe has opens it: there is no film in which it seals
+    assert replace(verdict, references=(10.9, 13.5)).after(lifted).word == OK
+    # of an instroke the contact of the air side comes first
+    back = replace(
+        lifted, speed=-100.0, flux=-lifted.flux, contacts=(lifted.contacts[1], lifted.contacts[0])
+    )
+    mirrored = replace(back, contacts=(back.contacts[0], replace(back.contacts[1], p_before=11.04)))
+    told = replace(verdict, references=(13.5, 12.0)).after(mirrored)
+    assert "lifts the contact on the air side" in told.advice
+
+
 def _torn_film(behind: float) -> dict[str, Array]:
     """Fields of a film whose pressure has two humps, 4 MPa and `behind`, below zero between them.
 

@@ -84,6 +84,11 @@ _MISMATCH = (
     "lets oil in or out there, and friction is not known; "
     'use cavitation = "mass-conserving"'
 )
+_LIFTED = (
+    "the oil lifts the contact on the {} side, which the dry seal presses on the rod with {:.3g} "
+    "MPa, more than the {:.3g} MPa of the groove: a second film may exist, in which this contact "
+    "seals, with another h* and friction; try another density or a list of speeds"
+)
 _ZIGZAG = (
     "the film oscillates from node to node (index {:.2g}): h* holds to a few per cent, the profile "
     f"does not; {FINER}"
@@ -185,6 +190,16 @@ class FilmNumbers:
         ratios = [contact.inlet_ratio for contact in others]
         finite = [ratio for ratio in ratios if isfinite(ratio) and not isfinite(self.lambda_ratio)]
         return max(finite, key=lambda ratio: abs(ratio - 1.0), default=1.0)
+
+    @property
+    def lifted(self) -> ContactNumbers | None:
+        """The contact that the oil lifts on its way to the one of h*; None if there is none.
+
+        Where h is above h* pressure rises, by (14): a contact whose least h is above h* has no peak
+        and holds nothing back.
+        """
+        first = self.contacts[:1] if self.flux > 0.0 else self.contacts[-1:]
+        return next((c for c in first if self.h_star > 0.0 and c.h_min > self.h_star), None)
 
     @property
     def touching(self) -> bool:
@@ -291,6 +306,8 @@ class Verdict:
             yield UNCERTAIN, _UNSEALED.format(self.unsealed)
         if self.overlap:
             yield UNCERTAIN, _OVERLAP.format(self.overlap)
+        if self._lifted:
+            yield UNCERTAIN, self._lifted
         if film.loses_oil:
             yield UNCERTAIN, _MISMATCH.format(film.mismatch)
         if self.error is not None and not abs(self.error) <= LARGEST_ERROR:
@@ -301,6 +318,19 @@ class Verdict:
             yield OSCILLATING, _ZIGZAG.format(film.oscillation)
         if self.reservation:
             yield UNCERTAIN, self.reservation
+
+    @property
+    def _lifted(self) -> str:
+        """Advice for a film that lifts a contact which may seal as well; empty for others.
+
+        Oil cannot enter a dry contact whose pressure is above its own.
+        """
+        film = self.last
+        if film is None or film.lifted is None or len(film.contacts) != len(self.references):
+            return ""
+        out = film.flux > 0.0
+        dry, groove = self.references[0 if out else -1], film.contacts[1 if out else -1].p_before
+        return _LIFTED.format("sealed" if out else "air", dry, groove) if dry > groove else ""
 
     def _resolves_inlets(self, film: FilmNumbers) -> bool:
         """True if the mesh shows the inlets of a film: it has not collapsed on it.
