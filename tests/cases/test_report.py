@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
+from math import nan
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -690,11 +691,24 @@ def test_files_of_a_hand_over(tmp_path: Path) -> None:
     assert sorted(path.name for path in (tmp_path / "seal").iterdir()) == sorted(FILES)
     header = ("sealed_pressure_MPa", "rod_speed_mm_s", "friction_N", "leakage_mm3_s")
     assert len(read_csv(tmp_path / "seal" / FILES[0], header)) == 14
-    assert "left out, as not every pressure has them: -300 mm/s" in said
+    assert "left out, as not every pressure has their friction: -300 mm/s" in said
     text = (tmp_path / "seal" / FILES[2]).read_text()
     assert "Preload force = 8 N" in text
     assert "Coulomb friction coefficient = 1.5e-06 N/Pa" in text
     assert "Transition coefficient = 40 s/m" in text
+
+
+def test_friction_that_is_not_known_is_not_handed_over(tmp_path: Path) -> None:
+    """An estimated state has none, and a table with nan stops a simulation."""
+    low, high = (finished(p, LAWS["Cylinder Friction"]) for p in (1.0, 5.0))
+    rows = cast("list[Any]", high.rows)
+    rows[0] = replace(rows[0], rod_friction_N=nan, verdict="estimated")
+    seal = SealMap.of([low, high])
+    assert np.isfinite(seal.friction).all()
+    assert seal.left_out == "-300 mm/s"
+    unknown = [replace(row, rod_friction_N=nan) for row in rows]
+    with pytest.raises(BadInput, match="without states that are estimated"):
+        write_hand_over(tmp_path / "seal", [replace(high, rows=unknown)])
 
 
 def test_what_is_not_one_seal_is_refused() -> None:
@@ -705,7 +719,7 @@ def test_what_is_not_one_seal_is_refused() -> None:
     harder = Seal(sealed_pressure=5.0, mu_1=4.0)
     with pytest.raises(BadInput, match="differ in mu_1"):
         SealMap.of([one, replace(other, parameters=harder)])
-    with pytest.raises(BadInput, match="no speed has a film at every sealed pressure"):
+    with pytest.raises(BadInput, match="no speed has a film with its friction at every"):
         SealMap.of(
             [
                 one,

@@ -165,6 +165,37 @@ def test_names_of_rings_with_a_leading_zero_and_of_quad_rings() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("name", "other", "rod"),
+    [
+        ("X-ring P20", "P20", 20),
+        ("X-ring JIS B 2401 P20", "P20", 20),
+        ("quad ring 0496-57", "0496-57", 50),
+        ("X-ring R27", "R27", 38),
+        ("36x4 X-ring", "36x4", 36),
+    ],
+)
+def test_an_x_ring_of_every_series_is_one(name: str, other: str, rod: int) -> None:
+    x_ring, o_ring = (typed(f"ring={ring}", f"rod={rod}") for ring in (name, other))
+    assert (x_ring.section, o_ring.section) == ("x_ring", "round")
+    assert x_ring.section_diameter == o_ring.section_diameter
+    assert x_ring.inner_diameter == o_ring.inner_diameter
+    assert x_ring.depth > o_ring.depth  # it needs less squeeze
+
+
+@pytest.mark.parametrize("name", ["U-cup P20", "U-cup 0496-57", "U-cup 1 in x 1.375 in x 0.3 in"])
+def test_a_u_cup_is_named_by_its_groove_in_millimetres_alone(name: str) -> None:
+    with pytest.raises(BadInput, match="named by rod x groove diameter x width in mm"):
+        typed(f"ring={name}", "rod=20")
+
+
+@pytest.mark.parametrize("section", ["x_ring", "rectangular"])
+def test_an_o_ring_has_no_other_section(section: str) -> None:
+    with pytest.raises(BadInput, match="contradict: leave one out"):
+        typed("ring=O-ring 36x4", "rod=36", f"section={section}")
+    assert typed("ring=36x4", "rod=36", f"section={section}").section == section
+
+
 # --- Two hundred spellings of rings, fits, oils, rubbers and finishes: read right, or refused -----
 
 

@@ -142,8 +142,10 @@ def _with_ring(values: dict[str, Any]) -> None:
     ring_name = read_ring(values["ring"])
     if ring_name.rubber:
         _with_rubber_of_ring(values, ring_name.rubber)
-    if ring_name.kind not in (None, "round"):
-        section = values.setdefault("section", ring_name.kind)
+    if ring_name.kind is not None:
+        section = values.get("section", ring_name.kind)
+        if ring_name.kind != "round":
+            values["section"] = section
         if section != ring_name.kind:
             raise ValueError(
                 f'section = "{section}" and ring = "{values["ring"]}" contradict: leave one out'

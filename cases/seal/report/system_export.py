@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,8 @@ HEADER = ("sealed_pressure_MPa", "rod_speed_mm_s", "friction_N", "leakage_mm3_s"
 class SealMap:
     """Friction (N) and leakage (mm^3/s) at speeds (mm/s, + = outstroke) and pressures (MPa).
 
-    friction, leakage: (speeds, pressures). left_out: films that only some pressures have, in words.
+    friction, leakage: (speeds, pressures). left_out: speeds at which not every pressure has a
+    film with its friction, in words.
     """
 
     speeds: Array
@@ -48,15 +50,19 @@ class SealMap:
     def of(cls, runs: Sequence[FinishedRun]) -> SealMap:
         """The films of runs of one seal, at the speeds that all pressures have.  BadInput."""
         _require_one_seal(runs)
+        rows = [row for run in runs for row in run.rows]
+        pressures = sorted({row.sealed_pressure_MPa for row in rows})
+        requested = sorted({row.rod_speed_mm_s for row in rows})
         rows_by_point: dict[tuple[float, float], FilmRow] = {
-            (row.rod_speed_mm_s, row.sealed_pressure_MPa): row for run in runs for row in run.rows
+            (row.rod_speed_mm_s, row.sealed_pressure_MPa): row
+            for row in rows
+            if isfinite(row.rod_friction_N)  # that of an estimated state is not known
         }
-        pressures = sorted({p for _, p in rows_by_point})
-        requested = sorted({u for u, _ in rows_by_point})
         speeds = [u for u in requested if all((u, p) in rows_by_point for p in pressures)]
         if not speeds:
             raise BadInput(
-                "no speed has a film at every sealed pressure: give runs of the same speeds"
+                "no speed has a film with its friction at every sealed pressure: give runs of the "
+                "same speeds, without states that are estimated"
             )
         lacking = [f"{u:+g} mm/s" for u in requested if u not in speeds]
         friction, leakage = (
@@ -177,7 +183,7 @@ def write_hand_over(folder: Path, runs: Sequence[FinishedRun]) -> list[str]:
     counts = " at ".join(f"{count} {what}{'s' * (count != 1)}" for count, what in sizes)
     lines = [f"{counts} written to {folder}: {', '.join(FILES)}"]
     if seal.left_out:
-        lines.append(f"left out, as not every pressure has them: {seal.left_out}")
+        lines.append(f"left out, as not every pressure has their friction: {seal.left_out}")
     if not laws:
         lines.append("no friction law: a fit needs 5 films at two speeds |U| or more")
     for name, law in laws.items():

@@ -113,6 +113,7 @@ _COMPOUND_FIRST = form(
 _POLYMER = form(
     r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM|Viton)\b.*)"
 )
+_NO_CUP = "is a U-cup, which is named by rod x groove diameter x width in mm"
 _SWOLLEN = form(r"\b(?:pre-?)?(?:swollen|swelled|swell(?:ing)?|aged)\b")
 _SIZE = form(
     rf"(?:\d{{3}}[AB][ -]+)?(?:ID|d1)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?x(?P<section>{NUMBER})"
@@ -138,7 +139,11 @@ def read_ring(name: str) -> RingName:
         standard = re.sub(r"[ -]", "", match["name"])
         return _with_standard(name, f"AS568-{match['number']}", standard, _MILITARY_RUBBERS)
     remainder, kind = _without_kind(_STANDARD.sub(" ", text))
-    if size := _by_series(remainder) or _in_inches(remainder, kind):
+    if series := _by_series(remainder):
+        if kind == "u_cup":
+            raise refused("ring", name, _NO_CUP, "U-cup 25x35x8")
+        return replace(series, kind=kind)
+    if size := _in_inches(remainder, kind):
         return size
     if (match := _ISO.fullmatch(remainder)) and not text.startswith("-") and remainder[3:]:
         return RingName(
@@ -157,9 +162,8 @@ def read_ring(name: str) -> RingName:
         a, b = float(sizes["inner"]), float(sizes["section"])
         if third is None:
             if kind == "u_cup":
-                why = "is a U-cup, which is named by rod x groove diameter x width"
                 usual = f"U-cup {a:g}x{a + 2 * b:g}x{round(1.6 * b, 1):g}"
-                raise refused("ring", name, why, usual)
+                raise refused("ring", name, _NO_CUP, usual)
             return RingName(inner=a, section=b, kind=kind)
         if (kind is None and b > a) or (kind == "u_cup" and b != a):
             inner, outer, width = min(a, b), max(a, b), float(third)
@@ -249,6 +253,8 @@ def _unknown(name: str, remainder: str, kind: Kind | None) -> Exception:
     if re.match(r"AS[ -]?568", remainder, re.IGNORECASE):
         return refused("ring", name, "is no size of AS568, which have three digits", usual[2])
     sizes = re.findall(NUMBER, remainder)
+    if kind == "u_cup" and re.search(_IN, remainder):
+        return refused("ring", name, _NO_CUP, "U-cup 25x35x8")
     if len(sizes) == 3 and (kind == "u_cup" or re.search(r"\dx[\d.]+x\d", remainder)):
         return refused("ring", name, "is not known", f"U-cup {'x'.join(sizes)}")
     if len(sizes) == 2 and not re.search(r'"|/|\bin', remainder):
