@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -424,8 +424,15 @@ class Problem:
         LOADS[self.load](study, self)
 
     def run(self, study: Study | None = None) -> Result:
-        """The state under the whole load, by the analysis."""
-        return ANALYSES[self.analysis](self, self.study() if study is None else study)
+        """The state under the whole load, by the analysis; of the problem itself, once for all
+        relations that begin with it or compare with it.
+        """
+        return _state(self) if study is None else ANALYSES[self.analysis](self, study)
+
+
+@lru_cache(maxsize=8)
+def _state(at: Problem) -> Result:
+    return ANALYSES[at.analysis](at, at.study())
 
 
 class Analysis(Protocol):
