@@ -1,8 +1,9 @@
 """Meshes in parts against the whole ones: the largest differences, relative to the largest value.
 
-    mpiexec -n 2 python -m tests.mpi.parts NAME FOLDER
+    mpiexec -n 2 python -m tests.mpi.parts FOLDER NAME...
 
-prints a JSON object on process 0. Every process also solves the whole, with the serial engine.
+prints a JSON object on process 0, with an entry for each problem. Every process also solves the
+whole, with the serial engine.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl import Mesh, Study
+from softehl import Mesh, SoftehlError, Study
 from softehl.runtime.analyses.motion import Motion
 from softehl.runtime.arrays import Array
 from softehl.runtime.mpi import world
@@ -146,8 +147,6 @@ def solved(name: str, folder: Path) -> dict[str, Any]:
         steps = pulled(spread=True).march(dt=0.5, until=1.0, engine="petsc", write=file)
         whole_steps = pulled(spread=False).march(dt=0.5, until=1.0)
         return compared([*steps][-1], [*whole_steps][-1], "body", "left")
-    if name in REFUSED:
-        REFUSED[name](folder)
     whole = study(mesh := box("hex" if name in ("files", "wrong") else name, spread=False)).solve()
     if name in SHAPES:
         mine = box(name, spread=True)
@@ -185,12 +184,32 @@ REFUSED: dict[str, Callable[[Path], object]] = {
     "too many": lambda folder: Mesh.line(1.0, cells=1, spread=True),
     "no file": lambda folder: Mesh.read(folder / "none.msh", spread=True),
 }
-"""What is refused in one line."""
+"""Calls that are refused."""
+
+
+def messages(folder: Path) -> dict[str, str]:
+    """Message of every refused call on process 0; empty unless all processes refuse it."""
+    found = {}
+    for name, call in REFUSED.items():
+        try:
+            call(folder)
+            said = ""
+        except (SoftehlError, OSError) as error:
+            said = str(error)
+        every = world().allgather(said)
+        found[name] = every[0] if all(every) else ""
+    return found
 
 
 def main() -> None:
-    name, folder = sys.argv[1:]
-    found = solved(name, Path(folder))
+    place, *names = sys.argv[1:]
+    found = {}
+    for name in names:
+        folder = Path(place) / name
+        if world().rank == 0:
+            folder.mkdir(exist_ok=True)
+        world().Barrier()
+        found[name] = messages(folder) if name == "refused" else solved(name, folder)
     if world().rank == 0:
         print(json.dumps(found))
 
