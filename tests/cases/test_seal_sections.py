@@ -220,7 +220,7 @@ def _two_lobes(h_star: float, lobe: tuple[float, float], groove: float) -> FilmN
     """A film at +100 mm/s, 10 MPa: h*, um; p_max and least h, um, of the first lobe; groove."""
     q = 0.05 * h_star
     film = FilmNumbers(100.0, q, 1e-3 * h_star, 1e-3, 12.5, 1.0, 1e-8, 0.0, 0.03, 14.0)
-    sealed = ContactNumbers(q, lobe[0], 1e-3 * lobe[1], -0.9, -0.3, 10.0)
+    sealed = ContactNumbers(q, lobe[0], 1e-3 * lobe[1], -0.9, -0.3, 10.0, lifted=lobe[0] < groove)
     air = ContactNumbers(q, 12.5, 3e-4, 0.9, 2.0, groove)
     return replace(film, contacts=(sealed, air))
 

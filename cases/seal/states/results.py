@@ -210,6 +210,7 @@ def _contacts(
                 end=end,
                 p_before=float(at["p"][part.start, 0]),
                 inlet_ratio=filled_ratio({name: v[part] for name, v in at.items()}, film),
+                lifted=_lifted(at, part, film.stroke),
             )
         )
     return tuple(numbers)

@@ -101,7 +101,8 @@ class ContactNumbers:
 
     start, end: where h is 20 um, or less over a shallow groove. p_before: pressure where its part
     of the film begins, in the groove between it and the one before. inlet_ratio: as of the film,
-    nan where too little oil reaches its inlet to fill it.
+    nan where too little oil reaches its inlet to fill it. lifted: the pressure of the groove behind
+    it is the largest of its part.
     """
 
     flux: float
@@ -111,6 +112,7 @@ class ContactNumbers:
     end: float
     p_before: float
     inlet_ratio: float = 1.0
+    lifted: bool = False
 
 
 @dataclass(frozen=True)
@@ -193,13 +195,9 @@ class FilmNumbers:
 
     @property
     def lifted(self) -> ContactNumbers | None:
-        """The contact that the oil lifts on its way to the one of h*; None if there is none.
-
-        Where h is above h* pressure rises, by (14): a contact whose least h is above h* has no peak
-        and holds nothing back.
-        """
+        """The first contact on the way of the oil if that lifts it; None if it holds oil back."""
         first = self.contacts[:1] if self.flux > 0.0 else self.contacts[-1:]
-        return next((c for c in first if self.h_star > 0.0 and c.h_min > self.h_star), None)
+        return next((contact for contact in first if contact.lifted), None)
 
     @property
     def touching(self) -> bool:
