@@ -276,9 +276,10 @@ class CycleCase(Case[Cycle, CycleRow]):
         leak = leaks(row.leak_mm3)
         if parameters.path.drift:
             leak = f"{row.leak_mm3:+.3g} mm3 past the air end, by a rod that does not come back"
-        elif row.leak_mm3 > 0.0 and parameters.motion is None:
-            period = 1.0 / parameters.frequency
-            leak += f", {far(row.leak_mm3, parameters.travel, parameters.service, period)}"
+        elif row.leak_mm3 > 0.0:
+            path = parameters.path
+            travel = 0.5 * path.distance
+            leak += f", {far(row.leak_mm3, travel, parameters.service, path.period)}"
         back = f", {-row.friction_in_N:.3g} N in" if row.friction_in_N < 0.0 else ""
         friction = f"friction {row.friction_out_N:.3g} N out{back} at most"
         parts = [f"cycle {row.cycle:g}: {leak}", friction]

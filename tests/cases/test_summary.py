@@ -152,6 +152,19 @@ def test_a_report_of_cycles_has_their_numbers() -> None:
     assert "every speed is a steady state" not in page
 
 
+def test_a_table_of_speeds_has_the_leakage_of_its_service() -> None:
+    """A trapezoid by its keys, and as a table, whose speed turns between two of its times."""
+    run = cycles()
+    by_keys = cycle.Cycle(shape="trapezoidal", travel=30.0, frequency=1.5, service="2000 h")
+    table = by_keys.path.speed
+    motion = tuple(zip(table.times, table.values, strict=True))
+    by_table = cycle.Cycle(motion=motion, service="2000 h")
+    assert by_table.path.distance == pytest.approx(60.0)
+    (line,) = run.case.summary(by_keys, run.rows)
+    assert "5.51 l in 2000 h" in line  # 0.51 mm3 in 1.08e7 cycles
+    assert run.case.summary(by_table, run.rows) == [line]
+
+
 def test_a_rod_that_does_not_come_back_returns_nothing() -> None:
     run = cycles()
     back = replace(run.rows[0], leak_mm3=-0.51)
