@@ -96,7 +96,12 @@ class Cycle(Seal):
             )
         if not self.path.speed.largest > 0.0 or not self.path.speed.values[0] > 0.0:
             raise ValueError("motion: the rod must begin with an outstroke, U > 0 at t = 0")
-        require_films(self, self.sealed_pressure)
+        if min(self.path.pressure.values) < 0.0:
+            lowest = min(self.path.pressure.values)
+            raise ValueError(
+                f"pressures: {lowest:g} MPa; a sealed pressure is 0 or more, above the air side"
+            )
+        require_films(self, self.path.pressure.largest)
         return self
 
     @property

@@ -222,6 +222,22 @@ def test_a_motion_that_does_not_go_to_and_fro_is_warned_of() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("highest", "says"),
+    [(400.0, "sealed_pressure = 400 MPa is .* films are found up to"), (-1.0, "-1 MPa; a sealed")],
+)
+def test_pressures_without_films_are_refused(highest: float, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        Cycle(roughness=(0.0, 0.2), pressures=((0.0, 1.0), (0.5, highest)))
+
+
+def test_a_motion_by_words_contradicts_no_key() -> None:
+    words: Any = {"stroke": 40.0, "frequency": 1.0}
+    with pytest.raises(ValueError, match=r"travel = 30\.0 and motion contradict"):
+        Cycle(roughness=(0.0, 0.2), motion=words, travel=30.0)
+    assert Cycle(roughness=(0.0, 0.2), motion=words, travel=40.0).travel == 40.0
+
+
 @pytest.mark.slow
 def test_long_periods_give_the_steady_curve(tmp_path: Path) -> None:
     """The mean leak over the period tends to that of steady strokes as one over it."""

@@ -186,6 +186,12 @@ def motion_keys(values: dict[str, Any]) -> dict[str, Any]:
                 f"motion: {unknown[0]!r} is not known; there are {', '.join(key_names)}"
             )
         renamed = {key_names[name]: value for name, value in motion.items()}
+        for key, value in renamed.items():
+            if values.get(key) not in (None, value):
+                raise ValueError(
+                    f"{key} = {values[key]} and motion contradict: the latter gives {value}; leave "
+                    "one of them out"
+                )
         return {**{k: v for k, v in values.items() if k != "motion"}, **renamed}
     if isinstance(motion, str):
         try:
