@@ -1,8 +1,9 @@
 """Problems for any engine and any number of processes, and what is compared of their results.
 
-    mpiexec -n 2 python -m tests.mpi.problems NAME ENGINE [FOLDER]
+    mpiexec -n 2 python -m tests.mpi.problems ENGINE FOLDER NAME...
 
-prints a JSON object on process 0.
+prints a JSON object on process 0, with an entry for each problem; a single problem has its files in
+FOLDER, several have a folder each there.
 """
 
 from __future__ import annotations
@@ -374,9 +375,14 @@ def _rank() -> int:
 
 
 def main() -> None:
-    name, engine, *rest = sys.argv[1:]
-    found = solved(name, engine, Path(*rest[:1]))
-    if engine == "serial" or _rank() == 0:
+    engine, place, *names = sys.argv[1:]
+    alone = engine == "serial"
+    found = {}
+    for name in names:
+        folder = Path(place) / (name if len(names) > 1 else "")
+        folder.mkdir(exist_ok=True)
+        found[name] = solved(name, engine, folder)
+    if alone or _rank() == 0:
         print(json.dumps(found))
 
 
