@@ -18,7 +18,7 @@ from softehl.runtime.equations.rigid_body_modes import require_supported
 from softehl.runtime.equations.stability import warn_unstable
 from softehl.runtime.equations.system import Step, System
 from softehl.runtime.results.result import Result
-from softehl.runtime.sensitivity.tape import Tape, continued_tape
+from softehl.runtime.sensitivity.tape import Tape, continued_tape, is_load_step
 from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.linear.factorisation_cache import iterative_part
 from softehl.runtime.solve.linear.linear_solver import LinearSolver
@@ -85,6 +85,11 @@ class LoadHistory:
         self.results.append(result)
         self.on_step(result)
 
+    def begin_with(self, result: Result) -> None:
+        """Take a result of the same study as the first point; nothing is committed again."""
+        self.results.append(result)
+        self.on_step(result)
+
     def _step(self, t: float) -> Step:
         return self.system.quasi_static_step(t, self.x, self.histories)
 
@@ -114,18 +119,24 @@ def solve(
     system = prepared.system
     initial = initial_state(system, start)
     first_step = SupportCheck(prepared.newton)
+    previous = continued_tape(system, start.trail if start else None)
+    # another step here would let friction slip and histories with a given dt go on
+    continued = start is not None and previous is not None and is_load_step(previous)
     with prepared.callbacks(LOAD_FACTOR, initial.t, until, on_step) as callbacks:
         history = LoadHistory.begin(
             system,
             initial,
             callbacks,
             memory=first_step.memory if options.record or system.size <= _FEW_UNKNOWNS else None,
-            previous=continued_tape(system, start.trail if start else None),
+            previous=previous,
             record=options.record,
             linear=prepared.newton.linear,
         )
 
         def commit(point: Point) -> None:
+            if continued and start is not None and not history.results:
+                history.begin_with(start)
+                return
             first_step.check(history.problem_at(point.parameter), point.solution)
             history.commit(point)
 
@@ -136,7 +147,9 @@ def solve(
             require_supported(system, ahead, initial.x)
         rule = StepRule(first, min(SMALLEST, first), first)
         path = Continuation(first_step.newton, rule, name=LOAD_FACTOR)
-        branch = path.follow(history.problem_at, initial.t, until, initial.x, on_point=commit)
+        branch = path.follow(
+            history.problem_at, initial.t, until, initial.x, on_point=commit, solved=continued
+        )
         history.require_end(branch)
     end = history.results[-1]
     # the factors of a solution without iterations are those of the previous step

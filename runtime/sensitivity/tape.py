@@ -123,6 +123,11 @@ def continued_tape(system: System, start: Tape | None) -> Tape | None:
     return start if start.system.definition_size == system.definition_size else None
 
 
+def is_load_step(tape: Tape) -> bool:
+    """True if the step is one of a path in the load factor, not of one in time."""
+    return tape.step.factor == tape.step.t and tape.step.dt == 0.0
+
+
 def _at_rest(first: Tape) -> bool:
     """True if a step begins with the values that the study says of the start."""
     initial = first.system.histories()

@@ -433,6 +433,7 @@ class Continuation:
         waypoints: Iterable[float] = (),
         on_point: OnPoint | None = None,
         previous: Point | None = None,
+        solved: bool = False,
     ) -> Branch:
         """Follow the path from `start` to `stop`.
 
@@ -452,6 +453,8 @@ class Continuation:
             Called with each converged Point.
         previous : Point, optional
             A point before the start, for the predictor.
+        solved : bool
+            True: x0 is the solution at the start, and is not solved for again.
 
         Returns
         -------
@@ -465,7 +468,7 @@ class Continuation:
         """
         earlier = [] if previous is None else [previous]
         stepper = _ParameterStepper(
-            self, problem_at, start, x0, goals_of(start, stop, waypoints), earlier
+            self, problem_at, start, x0, goals_of(start, stop, waypoints), earlier, solved
         )
         return follow_path(stepper, self.steps, PathLog(self.name, self.keep_all, on_point))
 
@@ -480,6 +483,7 @@ class _ParameterStepper(Stepper):
     x0: Array
     goals: list[float]
     points: list[Point]
+    solved: bool = False
 
     @property
     def resolution(self) -> float:
@@ -488,6 +492,8 @@ class _ParameterStepper(Stepper):
 
     def start(self) -> StepAttempt:
         """See `Stepper`."""
+        if self.solved:
+            return StepAttempt.solved(self.start_parameter, self.x0, self.settings.steps.first)
         corrector = self.settings.starter or self.settings.newton
         return StepAttempt(
             self.start_parameter, corrector.solve(self.problem_at(self.start_parameter), self.x0)
