@@ -295,7 +295,7 @@ class _ImplicitStepper(Stepper):
     """Stepper of an implicit march; holds the last state.
 
     equations: at the state, without inertia. forces, supports: there, (n,), without ties and
-    contacts, and without averaged ones.
+    contacts, and without averaged ones. holding: there, (n,), of supports, ties and springs.
     """
 
     march: ImplicitMarch
@@ -307,6 +307,7 @@ class _ImplicitStepper(Stepper):
     equations: Problem | None = None
     forces: Forces | None = None
     supports: Array = field(default_factory=lambda: np.empty(0))
+    holding: Array = field(default_factory=lambda: np.empty(0))
     _attempt: Step | None = None
 
     def start(self) -> StepAttempt:
@@ -348,6 +349,7 @@ class _ImplicitStepper(Stepper):
         end = body.at_end(step, v)
         histories = body.static_system.committed(end, x, previous.histories)
         initial_forces, supports, initial_equations = self.forces, self.supports, self.equations
+        initial_holding = self.holding
         state = MotionState(step.t, x, v, a, histories)
         self._set_state(end, state, Forces.of(end, x, body.roles))
         assert initial_forces is not None
@@ -359,7 +361,10 @@ class _ImplicitStepper(Stepper):
             middle = body.problem(without_inertia, integrator.load_time, 0.0 * x)
             mean = Forces.of(middle, x, body.roles)
             supports = _at_supports(end, mean.total + body.M @ acceleration)
+            springs = 0.5 * (initial_forces.springs + self.forces.springs)
+            holding = mean.total - springs + self.forces.contact + body.M @ acceleration
         else:
+            holding = self._weighted_holding(step, previous, initial_forces, initial_holding)
             mean = initial_forces.mean(self.forces)
             supports = 0.5 * (supports + self.supports)
         supports = supports + _at_supports(end, mean.constraints)
@@ -369,7 +374,27 @@ class _ImplicitStepper(Stepper):
         self.ledger.external += parameter_work(
             initial_equations, end, body.roles, (previous.x, x), middle
         )
-        self.result = self._motion(end, state, attempt.solution)
+        self.result = self._motion(end, state, attempt.solution, holding)
+
+    def _weighted_holding(
+        self, step: Step, previous: MotionState, initial: Forces, initial_holding: Array
+    ) -> Array:
+        """Forces (n,) of supports, ties and springs in the equation of a step that ends here.
+
+        They are zero where nothing holds. Newmark's are means of both ends, as its accelerations
+        at supports that move alternate. Where there is no mass equations hold at the end.
+        """
+        body, integrator, final = self.body, self.march.integrator, self.forces
+        assert final is not None
+        weight = integrator.final_weight
+        if weight == 1.0:
+            holding = 0.5 * (initial_holding + self.holding)
+        else:
+            acceleration = body.masked(integrator.equation_acceleration(step.dt, previous))
+            inertia = body.M @ np.where(body.has_mass, acceleration.at(self.state.x), 0.0)
+            holding = weight * (final.unheld + inertia) + (1.0 - weight) * initial.unheld
+            holding += final.contact
+        return np.where(body.has_mass, holding, final.unheld + final.contact)
 
     def end(self) -> End | None:
         """See `Stepper`."""
@@ -379,7 +404,9 @@ class _ImplicitStepper(Stepper):
 
     def _set_state(self, end: Problem, state: MotionState, forces: Forces) -> None:
         self.state, self.equations, self.forces = state, end, forces
-        self.supports = _at_supports(end, forces.total + self.body.M @ state.a)
+        inertia = self.body.M @ state.a
+        self.supports = _at_supports(end, forces.total + inertia)
+        self.holding = forces.unheld + forces.contact + inertia
 
     def _energies(self, end: Problem) -> dict[str, float]:
         v, x = self.state.v, self.state.x
@@ -388,7 +415,9 @@ class _ImplicitStepper(Stepper):
         assert self.forces is not None
         return self.ledger.balance(self.state.t, kinetic, stored, self.forces, x)
 
-    def _motion(self, end: Problem, state: MotionState, solution: Solution) -> Motion:
+    def _motion(
+        self, end: Problem, state: MotionState, solution: Solution, holding: Array
+    ) -> Motion:
         return Motion(
             self.body.static_system,
             self.body.comm.distribute(end.at(state.x)),
@@ -399,6 +428,7 @@ class _ImplicitStepper(Stepper):
             energy=self._energies(end),
             scheme=self.march.integrator,
             mass=self.body.mass,
+            holding=holding,
         )
 
 

@@ -6,7 +6,7 @@ Contact acts by a penalty (`softehl.runtime.contact.penalty`), its pairs searche
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -50,7 +50,8 @@ class ExplicitMarch:
     """Steps of at most SAFE times the stable one, which is looked at in each result.
 
     dt: from result to result. free: what supports and ties leave, and masses there. forces: at the
-    state. contact: its unknowns, if there are some.
+    state. contact: its unknowns, if there are some. moved: (n,) accelerations of supports at the
+    beginning of the last step, zero elsewhere.
     """
 
     dt: float
@@ -61,6 +62,7 @@ class ExplicitMarch:
     integrator: CentralDifference
     forces: Forces
     contact: _ContactUnknowns | None
+    moved: Array = field(default_factory=lambda: np.empty(0))
     warned: bool = False
 
     @classmethod
@@ -118,7 +120,8 @@ class ExplicitMarch:
             raise NotConverged(Branch((Point(initial.t, state),), Status.NOT_FINITE, message))
         a = self._accelerations(forces.total + forces.contact)
         displacement, old = x - initial.x, self.forces
-        supports = np.zeros(len(x))
+        supports, self.moved = np.zeros(len(x)), np.zeros(len(x))
+        self.moved[end.fixed] = ((half - initial.v) / dt)[end.fixed]
         total = 0.5 * (old.total + old.contact + forces.total + forces.contact)
         inertia = self.body.lumped_masses * (half - initial.v) / dt
         supports[end.fixed] = (total + inertia)[end.fixed]
@@ -185,6 +188,7 @@ class ExplicitMarch:
                         "ties of a constant offset, on no side of which a support moves"
                     )
         solution = Solution(state.x, Status.CONVERGED, f"{steps} steps", (), 0, 0)
+        a, forces = state.a + self.moved, self.forces
         distributed = self.body.comm.distribute(end.at(state.x))
         return Motion(
             self.body.static_system,
@@ -192,9 +196,10 @@ class ExplicitMarch:
             Point(state.t, solution),
             state.histories,
             v=state.v,
-            a=state.a,
+            a=a,
             energy=self._energies(end, ledger),
             stable_step=stable,
+            holding=forces.unheld + forces.contact + self.body.lumped_masses * a,
         )
 
 

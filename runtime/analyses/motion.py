@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -51,6 +52,9 @@ class Motion(Result):
         Time integrator.
     mass : mapping, optional
         Densities of `Study.march`.
+    holding : array (n,)
+        Forces of supports, ties and springs in the equation of the step, inertia included; on
+        several processes what the elements of this one add.
     """
 
     v: Array = field(default_factory=lambda: _EMPTY)
@@ -59,6 +63,12 @@ class Motion(Result):
     stable_step: float = float("nan")
     scheme: object = None
     mass: Masses | None = None
+    holding: Array = field(default_factory=lambda: _EMPTY)
+
+    @cached_property
+    def _forces(self) -> Array:
+        """Forces of supports, ties and springs, (n,), of all processes."""
+        return self.system.comm.gather_forces(self.holding)
 
     def velocity(self, name: str) -> Array:
         """Return the velocities of an unknown at every node.
@@ -178,6 +188,7 @@ class EnergyRoles:
 class Forces:
     """Forces on all unknowns, (n,) each: of loads, of what has an energy, of other pages, of ties
     and of contacts. conditions: the equations of the multipliers of contacts, zero elsewhere.
+    springs: those among `stored`.
 
     On several processes: the contribution of the elements of this one.
     """
@@ -188,6 +199,7 @@ class Forces:
     ties: Array
     contact: Array
     conditions: Array
+    springs: Array
 
     @classmethod
     def of(cls, problem: Problem, x: Array, roles: EnergyRoles) -> Forces:
@@ -195,17 +207,20 @@ class Forces:
         problem = problem.at(x)
         size = problem.assembler.size
         parts = {name: np.zeros(size) for name in ("load", "energy", "work", "tie", "contact")}
+        springs = np.zeros(size)
         for block in problem.assembler.blocks:
             part = parts.get(roles.of.get(block.name, "none"))
             if part is not None and block.name in problem.parameters:
                 local = block.residual(x, problem.parameters[block.name])
                 np.add.at(part, block.dofs.ravel(), local.ravel())
+                if isinstance(block.kernel, Spring):
+                    np.add.at(springs, block.dofs.ravel(), local.ravel())
         conditions = np.zeros(size)
         conditions[roles.multipliers] = parts["contact"][roles.multipliers]
         for name in ("tie", "contact"):
             parts[name][roles.multipliers] = 0.0
         load, energy, work, tie, contact = parts.values()
-        return cls(load, energy, work, tie, contact, conditions)
+        return cls(load, energy, work, tie, contact, conditions, springs)
 
     @property
     def total(self) -> Array:
@@ -217,9 +232,14 @@ class Forces:
         """Of ties and contacts."""
         return self.ties + self.contact
 
+    @property
+    def unheld(self) -> Array:
+        """Sum of all but those of ties, contacts and springs."""
+        return self.total - self.springs
+
     def mean(self, other: Forces) -> Forces:
         """Mean of both; of ties and contacts those of the other, which are means of its step."""
-        averaged = ("loads", "stored", "others")
+        averaged = ("loads", "stored", "others", "springs")
         return replace(other, **{n: 0.5 * (getattr(self, n) + getattr(other, n)) for n in averaged})
 
 
