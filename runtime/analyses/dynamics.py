@@ -349,7 +349,6 @@ class _ImplicitStepper(Stepper):
         end = body.at_end(step, v)
         histories = body.static_system.committed(end, x, previous.histories)
         initial_forces, supports, initial_equations = self.forces, self.supports, self.equations
-        initial_holding = self.holding
         state = MotionState(step.t, x, v, a, histories)
         self._set_state(end, state, Forces.of(end, x, body.roles))
         assert initial_forces is not None
@@ -364,7 +363,7 @@ class _ImplicitStepper(Stepper):
             springs = 0.5 * (initial_forces.springs + self.forces.springs)
             holding = mean.total - springs + self.forces.contact + body.M @ acceleration
         else:
-            holding = self._weighted_holding(step, previous, initial_forces, initial_holding)
+            holding = self.holding
             mean = initial_forces.mean(self.forces)
             supports = 0.5 * (supports + self.supports)
         supports = supports + _at_supports(end, mean.constraints)
@@ -375,26 +374,6 @@ class _ImplicitStepper(Stepper):
             initial_equations, end, body.roles, (previous.x, x), middle
         )
         self.result = self._motion(end, state, attempt.solution, holding)
-
-    def _weighted_holding(
-        self, step: Step, previous: MotionState, initial: Forces, initial_holding: Array
-    ) -> Array:
-        """Forces (n,) of supports, ties and springs in the equation of a step that ends here.
-
-        They are zero where nothing holds. Newmark's are means of both ends, as its accelerations
-        at supports that move alternate. Where there is no mass equations hold at the end.
-        """
-        body, integrator, final = self.body, self.march.integrator, self.forces
-        assert final is not None
-        weight = integrator.final_weight
-        if weight == 1.0:
-            holding = 0.5 * (initial_holding + self.holding)
-        else:
-            acceleration = body.masked(integrator.equation_acceleration(step.dt, previous))
-            inertia = body.M @ np.where(body.has_mass, acceleration.at(self.state.x), 0.0)
-            holding = weight * (final.unheld + inertia) + (1.0 - weight) * initial.unheld
-            holding += final.contact
-        return np.where(body.has_mass, holding, final.unheld + final.contact)
 
     def end(self) -> End | None:
         """See `Stepper`."""
