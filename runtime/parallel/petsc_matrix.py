@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -315,17 +316,18 @@ class PetscSolver:
         Raises SingularMatrix on all processes.
         """
         began = time.perf_counter()
-        ksp = self._prepared(tangent)
-        b = tangent.rows.to_petsc(r)
-        x = b.duplicate()
         reason = 0
-        try:
-            ksp.solve(b, x)
-            reason = ksp.getConvergedReason()
-        except petsc().Error as error:
-            raise SingularMatrix(f"PETSc: {_error_message(error)}") from None
-        finally:
-            self.times.solver += time.perf_counter() - began
+        with _options_of_petsc(self.options):
+            ksp = self._prepared(tangent)
+            b = tangent.rows.to_petsc(r)
+            x = b.duplicate()
+            try:
+                ksp.solve(b, x)
+                reason = ksp.getConvergedReason()
+            except petsc().Error as error:
+                raise SingularMatrix(f"PETSc: {_error_message(error)}") from None
+            finally:
+                self.times.solver += time.perf_counter() - began
         self.times.solves += 1
         self.times.iterations += ksp.getIterationNumber()
         size, solution = x.norm(), tangent.rows.local(x)
@@ -361,9 +363,6 @@ class PetscSolver:
         ksp = PETSc.KSP().create(world())
         pc = ksp.getPC()
         tangent.prepare(ksp, self.nullspace)
-        database = PETSc.Options()
-        for name, value in self.options.items():
-            database[name.removeprefix("-")] = value
         ksp.setFromOptions()
         if pc.getType() == "fieldsplit":
             first = tangent.matrix.getOwnershipRange()[0]
@@ -373,6 +372,27 @@ class PetscSolver:
             ]
             pc.setFieldSplitIS(*parts)
         return ksp
+
+
+@contextmanager
+def _options_of_petsc(options: Mapping[str, object]) -> Iterator[None]:
+    """Options in PETSc's database for one solve: the database is global, and other solvers read it.
+
+    Preconditioners read the options of their parts when they are set up, in the first solve.
+    """
+    database = petsc().Options()
+    names = {name.removeprefix("-"): value for name, value in options.items()}
+    before = {name: database.getString(name) for name in names if database.hasName(name)}
+    for name, value in names.items():
+        database[name] = value
+    try:
+        yield
+    finally:
+        for name in names:
+            if name in before:
+                database[name] = before[name]
+            else:
+                database.delValue(name)
 
 
 def _error_message(error: BaseException) -> str:
