@@ -17,7 +17,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from errno import EISDIR, ENOTDIR
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -229,10 +228,17 @@ def read_vtu(
     return points, cells, {name: np.asarray(data) for name, data in mesh.point_data.items()}
 
 
+def attribute(value: str) -> str:
+    """Value of an attribute in XML, with its quotes."""
+    from xml.sax.saxutils import quoteattr  # late: it imports the web client of Python
+
+    return quoteattr(value)
+
+
 def write_pvd(path: Path, entries: Iterable[tuple[float, str]]) -> None:
     """Write a series for ParaView, atomically: times, and the files beside it that show them."""
     rows = [
-        f'    <DataSet timestep="{t!r}" part="0" file={quoteattr(file)}/>\n' for t, file in entries
+        f'    <DataSet timestep="{t!r}" part="0" file={attribute(file)}/>\n' for t, file in entries
     ]
     text = (
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'

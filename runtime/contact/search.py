@@ -13,11 +13,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import product
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 from scipy.sparse import csc_array
-from scipy.spatial import cKDTree
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.contact.mortar_overlap import CORNER, common_part, mean_normal
@@ -28,6 +27,9 @@ from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.discretisation.sparsity import Structure
 from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.mesh.cells import CELLS
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 Sparse = csc_array
 FACING = -0.1  # cosine between normals; sides that meet more steeply do not press
@@ -143,6 +145,8 @@ def facing(
     one_side: Balls, other_side: Balls, limits: tuple[Array, Array]
 ) -> tuple[Integers, Integers]:
     """Pairs of opposite faces that are near enough to come into contact."""
+    from scipy.spatial import cKDTree  # late: slow to import
+
     (centre, radius, along), (far, size, against), (depth, reach) = one_side, other_side, limits
     tree = cKDTree(far)
     nearest = SLANTED * tree.query(centre)[0]

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import (
@@ -221,6 +220,8 @@ def partners(
     shift between both centres. Nodes at one place have partners of their own body; bodies: numbers
     of the bodies of ours and theirs, (n,).  Raises StudyError where there is none.
     """
+    from scipy.spatial import cKDTree  # late: slow to import
+
     a, b = side_points - side_points.mean(axis=0), partner_points - partner_points.mean(axis=0)
     distance, nearest = map(np.asarray, cKDTree(b).query(a))
     size = max(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.definition.argument_checks import finite
@@ -261,6 +260,7 @@ class LeastSquares:
 
     def _gauss_newton(self, scale: SearchVariables, max_evaluations: int) -> tuple[Array, str]:
         """Variables (k,) by SciPy's trust region, and the reason of the end."""
+        from scipy.optimize import least_squares  # late: slow to import
 
         def residuals(y: Array) -> Array:
             return self._tried(scale.values(y))

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from softehl.runtime.arrays import Array
 
@@ -89,4 +88,6 @@ def _model_step(g: Array, H: Array, radius: float) -> Array:
     if excess(smallest_shift) <= 0.0:
         return step(smallest_shift)
     largest_shift = smallest_shift + float(np.linalg.norm(g)) / radius + abs(float(sizes[0]))
+    from scipy.optimize import brentq  # late: slow to import
+
     return step(brentq(excess, smallest_shift, largest_shift))

@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.mesh.cells import CELLS, Cell, lagrange
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 _ITERATIONS = 25
 _STEADY = 1e-11  # a smaller step is the last one: that after it would be of its square
@@ -78,6 +80,8 @@ class PointLocator:
 
     @cached_property
     def _nodes(self) -> cKDTree:
+        from scipy.spatial import cKDTree  # late: slow to import
+
         used = [nodes.ravel() for nodes in self.cells.values()]
         return cKDTree(self.points[np.unique(np.concatenate(used))])
 
@@ -195,6 +199,8 @@ class _Boxes:
 
 def _boxes(cell: Cell, x: Array, tolerance: float) -> Iterator[_Boxes]:
     """Cells with nodes x (m, k, dim), those of sizes between two powers of two together."""
+    from scipy.spatial import cKDTree  # late: slow to import
+
     low, high = x[:, 0].copy(), x[:, 0].copy()
     for corner in range(1, cell.corners):  # much faster than min(axis=1)
         np.minimum(low, x[:, corner], out=low)

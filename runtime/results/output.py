@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from softehl.runtime.definition.argument_checks import writable
 from softehl.runtime.definition.problem_definition import Block, StudyError
 from softehl.runtime.discretisation.dofmap import AXES
 from softehl.runtime.equations.interpolation import at_every_node
-from softehl.runtime.io import replacing, write_text
+from softehl.runtime.io import attribute, replacing, write_text
 from softehl.runtime.mesh.cells import CELLS, linear_pieces
 from softehl.runtime.mesh.readers.meshio import import_meshio
 
@@ -102,7 +101,7 @@ class VtuFields:
             *("<PPoints>", _array("Points", 3), "</PPoints>"),
             *("<PPointData>", *at_nodes, "</PPointData>"),
             *("<PCellData>", *(_array(name, 1) for name in self.cellwise), "</PCellData>"),
-            *(f"<Piece Source={quoteattr(piece)}/>" for piece in pieces),
+            *(f"<Piece Source={attribute(piece)}/>" for piece in pieces),
             "</PUnstructuredGrid>",
             "</VTKFile>",
         ]
@@ -124,10 +123,9 @@ def _vtu_fields(result: Result, system: System, x: Array, local: Fields) -> VtuF
     for name, block in system.everywhere.blocks.items():
         if block.kernel.fields and CELLS[block.kind].dimension:
             nodal |= {f"{name}.{label}": v for label, v in result.at_nodes(name).items()}
-    if system is system.everywhere:
-        cells, fields = system.mesh.cells, result.fields
-    else:
-        cells, fields = local_cells(system), local
+    whole = system is system.everywhere
+    cells = system.mesh.cells if whole else local_cells(system)
+    fields: Fields = result.fields if whole else local
     return VtuFields.of(system.mesh.points, cells, nodal, system.blocks, fields)
 
 
@@ -187,7 +185,7 @@ def _lists(picture: VtuFields) -> list[Integers]:
 
 
 def _array(name: str, components: int) -> str:
-    return f'<PDataArray type="Float64" Name={quoteattr(name)} NumberOfComponents="{components}"/>'
+    return f'<PDataArray type="Float64" Name={attribute(name)} NumberOfComponents="{components}"/>'
 
 
 def _vectors(nodal: Mapping[str, Array]) -> dict[str, Array]:
