@@ -50,8 +50,8 @@ class Element:
         Parent coordinates of each node.
     shape : callable
         Shape functions at a point, shape(xi, eta, zeta).
-    rule : QuadratureRule
-        Rule that integrates the stiffness of an undistorted element exactly.
+    degree : int
+        Degree of the polynomials that `rule` integrates exactly.
     exponents : tuple of tuple
         Exponents of the monomials that span the shape functions; one more than the coordinates is
         that of 1 - zeta. Empty for products of lines of order 3 and more.
@@ -65,7 +65,7 @@ class Element:
     cell: ReferenceCell
     nodes: tuple[Point, ...]
     shape: ShapeFunctions
-    rule: QuadratureRule
+    degree: int
     exponents: Groups
     face_kinds: tuple[str, ...]
     files: FileNames
@@ -78,6 +78,11 @@ class Element:
     def dimension(self) -> int:
         """Number of parent coordinates."""
         return self.cell.dimension
+
+    @cached_property
+    def rule(self) -> QuadratureRule:
+        """Quadrature rule that integrates the stiffness of an undistorted element exactly."""
+        return self.cell.rule(self.degree)
 
     @property
     def order(self) -> int:
@@ -257,7 +262,7 @@ def high_order(
                 cell=cell,
                 nodes=nodes,
                 shape=lagrange_product(nodes),
-                rule=quadrature.gauss(points, cell.dimension),
+                degree=2 * (points - 1),
                 exponents=(),
                 face_kinds=(f"{face}{(order + 1) ** (cell.dimension - 1)}",),
                 files=FileNames(f"{meshio}{len(nodes)}"),

@@ -36,7 +36,7 @@ ELEMENTS = (
         cell=CELL,
         nodes=CELL.nodes(),
         shape=_rational,
-        rule=pyramid(2),
+        degree=2,
         exponents=((0, 0, 0, 0), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (1, 1, 0, -1)),
         face_kinds=("tri3", "quad4"),
         files=FileNames("pyramid", gmsh=7, abaqus="C3D5"),

@@ -89,6 +89,7 @@ def gauss(order: int, dimension: int) -> QuadratureRule:
     return QuadratureRule(dimension, points, tuple(sp.prod([w for _, w in e]) for e in grid))
 
 
+@cache
 def lobatto(order: int) -> tuple[Any, ...]:
     """Return the inner points of Gauss and Lobatto in (-1, 1), rising.
 

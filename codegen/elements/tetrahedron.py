@@ -21,7 +21,7 @@ ELEMENTS = (
         cell=CELL,
         nodes=_TET4,
         shape=simplex(_TET4),
-        rule=tetrahedron(1),
+        degree=1,
         exponents=powers(3, largest=1, total=1, squares=0),
         face_kinds=("tri3",),
         files=FileNames("tetra", gmsh=4, abaqus="C3D4"),
@@ -31,7 +31,7 @@ ELEMENTS = (
         cell=CELL,
         nodes=_TET10,
         shape=simplex(_TET10),
-        rule=tetrahedron(2),
+        degree=2,
         exponents=powers(3, largest=2, total=2, squares=1),
         face_kinds=("tri6",),
         files=FileNames(

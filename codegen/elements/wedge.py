@@ -57,7 +57,7 @@ ELEMENTS = (
         cell=CELL,
         nodes=CELL.nodes(),
         shape=_linear,
-        rule=wedge(2),
+        degree=2,
         exponents=tuple((*a, b) for b in (0, 1) for a in _FLAT_LINEAR),
         face_kinds=("tri3", "quad4"),
         files=FileNames("wedge", gmsh=6, abaqus="C3D6", vtk_mirrored=True),
@@ -67,7 +67,7 @@ ELEMENTS = (
         cell=CELL,
         nodes=CELL.nodes(*CELL.edges),
         shape=_quadratic,
-        rule=wedge(4),
+        degree=4,
         exponents=(
             *((*a, b) for b in (0, 1) for a in _FLAT_QUADRATIC),
             *((*a, 2) for a in _FLAT_LINEAR),
@@ -86,7 +86,7 @@ ELEMENTS = (
         cell=CELL,
         nodes=CELL.nodes(*CELL.edges, *CELL.sides[2:]),
         shape=_biquadratic,
-        rule=wedge(4),
+        degree=4,
         exponents=tuple((*a, b) for b in (0, 1, 2) for a in _FLAT_QUADRATIC),
         face_kinds=("tri6", "quad9"),
         files=FileNames(
