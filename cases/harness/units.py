@@ -1,4 +1,4 @@
-"""Numbers with units, as a user types them: "50 bar", "0.2 m/s", "12 %".
+"""Numbers with units, as a user types them: "50 bar", "0.2 m/s", "12 %", "1 3/8 in".
 
 Everything is computed in mm, MPa, N, s; a key says which of these it is in, and a text with a unit
 of the same kind is converted to it. There is no arithmetic of units here.
@@ -6,9 +6,11 @@ of the same kind is converted to it. There is no arithmetic of units here.
 
 import re
 from collections.abc import Collection
+from fractions import Fraction
 
 _QUANTITY = re.compile(
-    r"""[ ]*([+-]?(?:\d+,\d{1,2}(?!\d)|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
+    r"""[ ]*((?:\d+[ -])?\d+/[1-9]\d*(?=[ ]*(?:in|inch|")[ ]*$)
+    |[+-]?(?:\d+,\d{1,2}(?!\d)|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
     [ ]*(1/\S+|(?![eE][+-]?\d)[A-Za-z%"\xb5\xb0\u03bc][^\n]*?)[ ]*""",
     re.VERBOSE,
 )
@@ -90,7 +92,10 @@ def read_quantity(text: str, unit: str) -> float:
     """
     factors, match = _KINDS.get(unit, {unit: 1.0}), _QUANTITY.fullmatch(text)
     spelling = match[2].replace("·", " ").replace("*", " ") if match else ""
-    number = float(match[1].replace(",", ".")) if match else 0.0
+    if match and "/" in match[1]:  # a whole number and a fraction: 1 3/8
+        number = float(sum(map(Fraction, re.split("[ -]", match[1]))))
+    else:
+        number = float(match[1].replace(",", ".")) if match else 0.0
     if (spelling := _spelt(spelling, factors)) in factors:
         return number * factors[spelling]
     if unit == "degC" and spelling in _FAHRENHEIT:

@@ -194,6 +194,8 @@ def test_a_key_is_set_once() -> None:
         ("40 mPa s", "MPa s", 4e-8),
         ("40 cP", "MPa s", 4e-8),
         ("2 in", "mm", 50.8),
+        ("3/4 in", "mm", 19.05),
+        ('1-3/8"', "mm", 34.925),
         ("-30 deg", "degrees", -30.0),
         ("1e3 kPa", "MPa", 1.0),
         ("20 1/GPa", "1/MPa", 0.02),
