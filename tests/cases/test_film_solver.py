@@ -292,6 +292,8 @@ def test_a_film_with_a_large_error_is_solved_on_finer_meshes(
     assert found.estimate.ratio == (3 / 5 if density == 5 else 5 / 6)
     assert found.film.numbers.h_star == pytest.approx(film.numbers.h_star, rel=5e-3)
     assert found.sure is (bound < 2.0)
+    monkeypatch.setattr(Adapted, "off_theory", -6.5)  # of the contact on this mesh
+    assert not found.sure
 
 
 def test_a_mesh_that_is_given_is_not_made_anew(dry: DryContact, films: dict[float, Film]) -> None:

@@ -2,7 +2,8 @@
 
 The loop ends where the mesh fits the film that is solved on it, and where the errors that are left
 are small enough. These are estimated from the same film on a coarser mesh of the same spacing
-(`states.estimate`); where they are too large, the film is solved on a finer one, too.
+(`states.estimate`); where they are too large, the film is solved on a finer one, too. So it is
+where the theory of the inlet differs from it: the theory has an error of the mesh of its own.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 
 from softehl.cases.seal.equations.system import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
@@ -26,7 +28,13 @@ from softehl.cases.seal.states.estimate import (
     reservation,
     unseen,
 )
-from softehl.cases.seal.states.verdict import LARGEST_ERROR, fewest_inlet_segments, shows_inlet
+from softehl.cases.seal.states.inlet_edges import Predictions, predicted
+from softehl.cases.seal.states.verdict import (
+    LARGEST_ERROR,
+    MOST_OFF_THEORY,
+    fewest_inlet_segments,
+    shows_inlet,
+)
 from softehl.runtime.mesh.mesh import MeshError
 
 FITS, SHOWS = 2.2, 3.0
@@ -60,9 +68,23 @@ class Adapted:
         coarse, fine = (film.system.section.density for film in (self.coarser, self.film))
         return Estimate(self.film.numbers, self.coarser.numbers, float(coarse / fine))
 
+    @cached_property
+    def theory(self) -> Predictions | None:
+        """Film by the theory of the inlet over the dry contact of its mesh."""
+        film = self.film
+        return predicted(film.system, film.squeeze_film.dry, film.loads.stroke, film.loads.speed)
+
+    @property
+    def off_theory(self) -> float | None:
+        """Difference of the theory from h*, %; None where it does not apply."""
+        theory = self.theory
+        if theory is None or not theory.applies or self.film.system.parameters.rough:
+            return None
+        return theory.difference(self.film.numbers.h_star)
+
     @property
     def sure(self) -> bool:
-        """True if the estimated errors leave a state `ok`, as far as a mesh decides it.
+        """True if errors and theory leave a state `ok`, as far as a mesh decides it.
 
         A finer mesh of the same arc does not add the oil beyond its ends.
         """
@@ -70,6 +92,8 @@ class Adapted:
         if estimate is None or not self.fits or not abs(estimate.h_star) <= LARGEST_ERROR:
             return False
         if not shows_inlet(estimate.film.inlet_ratio):
+            return False
+        if self.off_theory is not None and not abs(self.off_theory) <= MOST_OFF_THEORY:
             return False
         return estimate.beyond > LARGEST_ERROR or not reservation(p, estimate)
 

@@ -34,7 +34,6 @@ from softehl.cases.seal.states.estimated import (
     estimated_state,
     theory_by_contact,
 )
-from softehl.cases.seal.states.inlet_edges import predicted
 from softehl.cases.seal.states.results import film_state
 from softehl.cases.seal.states.run_plan import strokes_of
 from softehl.cases.seal.states.sensitivity_table import differentiable
@@ -92,13 +91,13 @@ class Judge:
         """The state of a film; faster: of the same stroke at the next higher speed, if there is."""
         film, estimate, p = adapted.film, adapted.estimate, adapted.film.system.parameters
         error = estimate.h_star if estimate else nan
-        theory = predicted(film.system, film.squeeze_film.dry, film.loads.stroke, film.loads.speed)
-        applies = theory is not None and theory.applies and not p.rough
+        theory, difference = adapted.theory, adapted.off_theory
+        reserved = _reservation(p, estimate, difference is not None) if adapted.fits else UNFIT
         verdict = replace(
             replace(self.contact, last=faster).after(film.numbers),
             error=error if p.error_estimate and p.mesh == "graded" else None,
-            reservation=_reservation(p, estimate, applies) if adapted.fits else UNFIT,
-            theory=theory.difference(film.numbers.h_star) if theory and applies else None,
+            reservation=reserved,
+            theory=difference,
         )
         friction_known = film.numbers.friction_known
         state = replace(
