@@ -121,7 +121,7 @@ def solve(
     first_step = SupportCheck(prepared.newton)
     previous = continued_tape(system, start.trail if start else None)
     # another step here would let friction slip and histories with a given dt go on
-    continued = start is not None and previous is not None and is_load_step(previous)
+    continued = previous is not None and is_load_step(previous) and until != initial.t
     with prepared.callbacks(LOAD_FACTOR, initial.t, until, on_step) as callbacks:
         history = LoadHistory.begin(
             system,

@@ -164,7 +164,8 @@ def test_mesh_study_and_result_are_copied_and_pickled(copied: Any) -> None:
     objective = copied(again.objective("u_x", by=by, at=(2, 0)))
     assert objective(objective.start)[0] == result.at((2, 0))["u_x"]
     end = study.solve(start=result, until=2.0)
-    np.testing.assert_array_equal(again.solve(start=state, until=2.0).x, end.x)
+    # the copy of a result has no path behind it: its start is solved for again
+    np.testing.assert_allclose(again.solve(start=state, until=2.0).x, end.x, atol=1e-16)
 
 
 LATER = """
