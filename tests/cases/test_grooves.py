@@ -270,6 +270,23 @@ RUBBERS = {
 }
 
 
+SPELT = {
+    **dict.fromkeys(("JIS B 2401-1A-P20", "1A P20", "JIS B 2401-1-NBR-70-1-P20-N"), (19.8, 2.4)),
+    **{"P 10 A": (9.8, 2.4), "G100-S": (99.4, 3.1), "NAS1611-210A": (18.6436, 3.5306)},
+    **dict.fromkeys(("ID 20 OD 26", "OD 26, section 3", "CS 3 OD 26", "20 mm by 3 mm"), (20, 3)),
+    **{"NF T 47-501 R20": (26.2, 3.6), "SMS 1586 19.2x3": (19.2, 3.0), "20x3.55G": (20, 3.55)},
+}
+
+
+def test_other_spellings_of_the_same_ring() -> None:
+    for name, sizes in SPELT.items():
+        known = ring(name)
+        assert (known.inner_diameter, known.section_diameter) == pytest.approx(sizes), name
+    for name in ("OD 26 ID 28", "2-210N", "JIS class 9 P-20"):  # no hint that is another ring
+        with pytest.raises(ValueError, match=r"28 and a section of -1|36x4"):
+            ring(name)
+
+
 def test_rings_with_their_rubber() -> None:
     for name, rubber in RUBBERS.items():
         p = made(ring=name, rod=19.0)

@@ -82,6 +82,23 @@ def test_a_rod_with_a_fit_is_solved_at_the_middle_of_its_limits() -> None:
     assert CASE.foreword(p)[0] == ("rod = 19 f7: 18.959 to 18.98 mm, solved at the middle, 18.9695")
 
 
+IN_INCHES = {
+    **dict.fromkeys(
+        ("0.748 ±0.001 in", "0.747 to 0.749 in", ".748 in ±.001 in"), (18.9992, 0.0254)
+    ),
+    **{'0.748 +0/-0.002"': (18.9738, 0.0254), "3/4 in -0.001/-0.002 in": (19.0119, 0.0127)},
+    **{"19 -20/-41 um": (18.9695, 0.0105), "19 mm ±25 um": (19.0, 0.025)},
+}
+
+
+def test_limits_in_inches_and_deviations_in_um() -> None:
+    for rod, (middle, half) in IN_INCHES.items():
+        p = typed("ring=AS568-210", f"rod={rod}", "sensitivity=true")
+        assert p.rod_diameter == pytest.approx(middle, abs=1e-9), rod
+        assert read_tolerances(p)["rod_diameter"]["rod_diameter"] * middle == pytest.approx(half)
+        assert Seal(**p.model_dump()) == p
+
+
 def test_a_finish_is_an_rms_height_and_its_factor_is_told() -> None:
     p = typed("roughness=Ra 0.2")
     assert p.roughness == pytest.approx((0.0, 0.250663), rel=1e-5)

@@ -165,6 +165,9 @@ def _with_ring(values: dict[str, Any]) -> None:
     ring = catalogue.ring(values["ring"])
     if values.get("rod_diameter") is None:
         rod, bore = round(1.02 * ring.inner_diameter, 1), round(ring.outer_diameter, 1)
+        if ring_name.code and ring.groove:  # JIS B 2401 names a ring by its rod
+            rod = float(ring_name.code[1:].rstrip("A"))
+            bore = rod + 2.0 * ring.groove.depth
         raise ValueError(
             f'ring = "{values["ring"]}" needs the rod that it seals, as in rod = {rod:g}, '
             f"or the bore of a piston seal, as in bore = {bore:g}"

@@ -1,5 +1,7 @@
 """Sizes with a tolerance: classes of ISO 286 ("36 f7", "40 H8") and limits ("36 -0.025/-0.05").
 
+Limits may be in inches, and deviations of a size in mm in um.
+
 `iso286.csv` holds the standard tolerances and fundamental deviations of ISO 286-1 up to 500 mm, um.
 """
 
@@ -8,7 +10,9 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from dataclasses import dataclass
+from fractions import Fraction
 
+from softehl.cases.seal.gland.grooves import INCH
 from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.normalise_text import NUMBER, number_text, plain, refused
 
@@ -37,10 +41,14 @@ _SIZE = rf"(?:d ?|dia\.? ?)?(?P<size>{NUMBER}) ?(?:mm)?"
 _CLASS = re.compile(rf"{_SIZE}[ -]*(?P<letter>[A-Za-z]{{1,2}}) ?(?P<grade>\d{{1,2}})")
 _ENDS = re.compile(rf"({NUMBER}) ?(?:mm)? ?(?:to|\.\.+|-|bis) ?({NUMBER}) ?(?:mm)?")
 _BOTH = re.compile(rf"{_SIZE} ?[A-Za-z]{{1,2}} ?\d{{1,2}} ?/ ?[A-Za-z]{{1,2}} ?\d{{1,2}}")
-_EQUAL = re.compile(rf"{_SIZE} ?(?:±|\+ ?/? ?-) ?(?P<by>{NUMBER}) ?(?:mm)?")
+_EQUAL = re.compile(rf"{_SIZE} ?(?:±|\+ ?/? ?-) ?(?P<by>{NUMBER}) ?(?:mm|(?P<um>um))?")
 _LIMITS = re.compile(
-    rf"{_SIZE} ?(?P<one>[+-] ?{NUMBER}|0(?=[ /;]))? ?[ /;]+(?P<two>[+-] ?{NUMBER}|0) ?(?:mm)?"
+    rf"{_SIZE} ?(?P<one>[+-] ?{NUMBER}|0(?=[ /;]))? ?[ /;]+(?P<two>[+-] ?{NUMBER}|0)"
+    r" ?(?:mm|(?P<um>um))?"
 )
+_IN = re.compile(r"(?<=\d) ?(?:in(?:ch(?:es)?)?\b\.?|\"|'')", re.IGNORECASE)
+_FRACTION = re.compile(r"^(?:\d+[ -])?\d+/\d+(?![\d/])")
+_POINT = re.compile(r"(?<![\d.])\.(?=\d)")
 
 
 @dataclass(frozen=True)
@@ -71,10 +79,16 @@ def read_fit(key: str, size_text: str, *, hole: bool | None = False) -> Band | N
     text = re.sub(
         r" ?[(](?:ISO 286[^)]*|(?P<limits>[^)]*))[)]$", r" \g<limits>", plain(size_text)
     ).strip()
+    text, inches = _IN.subn("", text)
+    unit = INCH if inches else 1.0
+    if inches:
+        text = _POINT.sub("0.", _FRACTION.sub(_decimal, text))
     if match := _ENDS.fullmatch(text):
-        low, high = sorted(map(float, match.groups()))
+        low, high = sorted(unit * float(end) for end in match.groups())
         if 0.9 * high < low:
             return Band(round(0.5 * (low + high), 6), low, high)
+    if inches and (_CLASS.fullmatch(text) or "mm" in text):
+        raise refused(key, size_text, "mixes inches with mm", f"{re.split('[^0-9.]', text)[0]} in")
     if match := _CLASS.fullmatch(text):
         return _class(key, size_text, match, hole)
     if match := _BOTH.fullmatch(text):
@@ -87,11 +101,18 @@ def read_fit(key: str, size_text: str, *, hole: bool | None = False) -> Band | N
         deviations = sorted(float((match[k] or "0").replace(" ", "")) for k in ("one", "two"))
     else:
         return None
-    size = float(match["size"])
-    low, high = size + deviations[0], size + deviations[1]
+    size = unit * float(match["size"])
+    micro = 1e-3 if match["um"] else unit
+    low, high = size + micro * deviations[0], size + micro * deviations[1]
     if not 0.0 < low <= high or high - low > 0.1 * size:
-        raise refused(key, size_text, "has limits that are no tolerance of it", f"{size:g} ±0.05")
+        usual = f"{size / unit:g} in ±0.002 in" if inches else f"{size:g} ±0.05"
+        raise refused(key, size_text, "has limits that are no tolerance of it", usual)
     return Band(size, low, high)
+
+
+def _decimal(match: re.Match[str]) -> str:
+    """A fraction of inches ("1 3/4") as a number with a decimal point."""
+    return str(float(sum(Fraction(part) for part in re.split("[ -]", match[0]))))
 
 
 def band(nominal: float, letter: str, grade: int) -> Band:

@@ -52,7 +52,8 @@ _SECTIONS = {
 _STANDARD = form(
     r"\b(?:(?:DIN|EN|BS|GOST R)[ -]?)*ISO[ -]?3601(?:-[1-5][AB]?(?!\d))?(?:[:-](?:19|20)\d\d)?"
     r"|\bDIN[ -]?377[01](?:-[1-5](?!\d))?|\bGB/?T[ -]?3452(?:\.1)?(?:-(?:19|20)\d\d)?"
-    r"|\bBS[ -]?4518(?::(?:19|20)\d\d)?|\bJIS ?B ?2401(?:-[1-4](?!\d))?(?::(?:19|20)\d\d)?"
+    r"|\bBS[ -]?4518(?::(?:19|20)\d\d)?|\bJIS ?B ?2401(?:-[1-4](?![A-D\d]))?(?::(?:19|20)\d\d)?"
+    r"|\bNF ?T ?47-50[123]|\bSMS[ -]?158[68]"
 )
 _DASH = form(
     r"(?P<said>(?:SAE )?AS[ -]?568[A-G]?(?: dash| no\.?)?|ARP ?568|#|BS(?: ?1806)?|Parker"
@@ -68,7 +69,7 @@ _ISO = form(
 _MILITARY = form(
     r"(?P<name>MS ?-?(?:28775|29513)|M ?-?(?:25988|83248|83461|83485)(?:/\d)?"
     r"|NAS ?-?(?:1593|1594|1611))"
-    r"[ -]+(?P<number>\d{3})"
+    r"[ -]+(?P<number>\d{3})[A-Z]?"
 )
 """Standards of rubbers whose rings have the dash numbers of AS568."""
 _MILITARY_RUBBERS = {
@@ -94,8 +95,12 @@ _PARKER_RUBBERS = {
 }
 """Compound of Parker's O-ring handbook, without the 0 behind its letter -> rubber."""
 _SERIES = form(
-    r"(?:JIS ?)?(?P<letter>[PGVSR])[ -]?(?P<size>\d+(?:\.\d)?A?)(?:[ -]+(?P<type>[1-4][A-D]))?"
+    r"(?:JIS[ -]*)?(?:(?:class )?(?P<class_>[1-4][A-D])[ -]+)?(?P<letter>[PGVSR])[ -]?"
+    r"(?P<size>\d+(?:\.\d)?(?: ?A)?)(?:[ -]+(?:class )?(?P<type>[1-4][A-D]))?(?:[ -]+(?:N|S|CS))?"
 )
+"""Class of rubber of JIS B 2401 before 2012, letter and size, grade of JIS B 2401-3 of 2012."""
+_JIS_GRADE = form(r"(?<=\bNBR-70)-[12](?!\d)")
+"""What JIS B 2401-1 of 2012 adds to its NBR 70: for mineral oil or for fuel."""
 _JIS_RUBBERS = {"1A": "NBR 70", "1B": "NBR 90", "4C": "VMQ 70", "4D": "FKM 70"}
 """Class of rubber of JIS B 2401 before 2012 -> rubber."""
 _BS_4518 = form(r"(?P<inner>\d{4})-(?P<section>16|24|30|41|57|84)")
@@ -117,18 +122,24 @@ _NO_CUP = "is a U-cup, which is named by rod x groove diameter x width in mm"
 _SWOLLEN = form(r"\b(?:pre-?)?(?:swollen|swelled|swell(?:ing)?|aged)\b")
 _SIZE = form(
     rf"(?:\d{{3}}[AB][ -]+)?(?:ID|d1)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?x(?P<section>{NUMBER})"
-    rf" ?(?:mm)?(?:x(?P<third>{NUMBER}) ?(?:mm)?)?(?:[ -]+[GA])?(?:[ -]+(?:N|S|CS))?"
+    rf" ?(?:mm)?(?:x(?P<third>{NUMBER}) ?(?:mm)?)?(?:[ -]*[GA])?(?:[ -]+(?:N|S|CS))?"
 )
 _WORDS = form(
     rf"(?:ID|d1|inside|inner)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?[ ,;/]+(?:CS|d2|section)[ =]*"
     rf"(?P<section>{NUMBER}) ?(?:mm)?"
 )
+_OUTSIDE = form(
+    rf"(?:(?P<word>ID|inside|CS|section)[ =]*(?P<other>{NUMBER}) ?(?:mm)?[ ,;/x-]+)?"
+    rf"(?:OD|outside)[ =]*(?P<outer>{NUMBER}) ?(?:mm)?"
+    rf"(?:[ ,;/x-]+(?P<word_2>ID|inside|CS|section)[ =]*(?P<other_2>{NUMBER}) ?(?:mm)?)?"
+)
 
 
 def read_ring(name: str) -> RingName:
     """The ring of a name.  Raises NotUnderstoodError."""
-    text = plain(name)
-    if match := _COMPOUND.fullmatch(text) or _COMPOUND_FIRST.fullmatch(text):
+    text = _JIS_GRADE.sub("", re.sub(r"(?<=\d) ?(?:mm )?by (?=\d)", "x", plain(name)))
+    bare = " ".join(_STANDARD.sub(" ", text).split()).lstrip(" -")
+    if match := _COMPOUND.fullmatch(bare) or _COMPOUND_FIRST.fullmatch(bare):
         rubber = read_rubber("ring", match["rubber"])
         return replace(
             read_ring(match["ring"]), rubber=rubber.text if rubber else None, standard=None
@@ -156,6 +167,8 @@ def read_ring(name: str) -> RingName:
     match = (
         None if text.startswith("-") else _SIZE.fullmatch(remainder) or _WORDS.fullmatch(remainder)
     )
+    if ring_name := _by_outside(remainder, kind):
+        return ring_name
     if match:
         sizes = match.groupdict()
         third = sizes.get("third")
@@ -191,9 +204,9 @@ def _with_standard(name: str, ring: str, standard: str, rubbers: dict[str, str])
 def _by_series(text: str) -> RingName | None:
     """A ring by letter and size, or by the size code of BS 4518."""
     if match := _SERIES.fullmatch(text):
-        kind = (match["type"] or "").upper()
+        kind = (match["type"] or match["class_"] or "").upper()
         standard = f"JIS B 2401 {kind}" if kind in _JIS_RUBBERS else None
-        code = match["letter"].upper() + match["size"].upper()
+        code = (match["letter"] + match["size"].replace(" ", "")).upper()
         return RingName(code=code, rubber=_JIS_RUBBERS.get(kind), standard=standard)
     if match := _BS_4518.fullmatch(text):
         return RingName(inner=int(match["inner"]) / 10, section=int(match["section"]) / 10)
@@ -213,6 +226,17 @@ def _in_inches(text: str, kind: Kind | None) -> RingName | None:
     return RingName(
         inner=sizes[0], section=sizes[-1], kind=kind, inch="nominal" if nominal else "true"
     )
+
+
+def _by_outside(text: str, kind: Kind | None) -> RingName | None:
+    """A ring in mm by its outside diameter, and by its inside diameter or its section."""
+    match = _OUTSIDE.fullmatch(text)
+    if not match or kind == "u_cup" or bool(match["word"]) == bool(match["word_2"]):
+        return None
+    outer, other = float(match["outer"]), float(match["other"] or match["other_2"])
+    inside = (match["word"] or match["word_2"]).lower() in ("id", "inside")
+    inner, section = (other, (outer - other) / 2.0) if inside else (outer - 2.0 * other, other)
+    return RingName(inner=round(inner, 4), section=round(section, 4), kind=kind)
 
 
 def read_section(word: str) -> str:
@@ -259,6 +283,7 @@ def _unknown(name: str, remainder: str, kind: Kind | None) -> Exception:
         return refused("ring", name, "is not known", f"U-cup {'x'.join(sizes)}")
     if len(sizes) == 2 and not re.search(r'"|/|\bin', remainder):
         large, small = sorted(map(float, sizes), reverse=True)
-        if 0.5 <= small <= min(20.0, 2.0 * large) and not re.search(r"[A-Za-z]\d", remainder):
+        plain_sizes = not re.search(r"[A-Za-z]", re.sub(r"\bmm\b", "", remainder))
+        if 0.5 <= small <= min(20.0, 2.0 * large) and plain_sizes:
             return refused("ring", name, "is not known", f"{large:g}x{small:g}", usual[2])
     return refused("ring", name, "is not known", *usual)
