@@ -222,10 +222,16 @@ def _monomials(at: Array, exponents: Sequence[tuple[int, ...]]) -> Array:
     coordinate where there is one exponent more; 0 at the apex, where both factors are 0.
     """
     powers, at = np.asarray(exponents), np.asarray(at)
+    polynomial = np.ones((len(at), len(powers)))
+    for d in range(at.shape[1]):  # much faster than powers of floating-point numbers
+        of_one = np.ones((len(at), powers[:, d].max() + 1))
+        np.cumprod(
+            np.broadcast_to(at[:, d : d + 1], of_one[:, 1:].shape), axis=1, out=of_one[:, 1:]
+        )
+        polynomial *= of_one[:, powers[:, d]]
     if powers.shape[1] == at.shape[1]:
-        return np.asarray(np.prod(at[:, None, :] ** powers[None], axis=2))
+        return polynomial
     depth = 1.0 - at[:, -1:]
-    polynomial = np.prod(at[:, None, :] ** powers[None, :, :-1], axis=2)
     quotient = np.where(depth == 0.0, 1.0, depth) ** powers[:, -1].astype(float)
     return np.where((depth == 0.0) & (powers[:, -1] < 0), 0.0, polynomial * quotient)
 
