@@ -568,6 +568,7 @@ softehl_kernel softehl_contact_friction_tangent;
 softehl_kernel softehl_contact_corner_energy;
 softehl_kernel softehl_contact_corner_residual;
 softehl_kernel softehl_contact_corner_tangent;
+softehl_kernel softehl_contact_corner_pseudo_load;
 softehl_kernel softehl_mortar_22_residual;
 softehl_kernel softehl_mortar_22_tangent;
 softehl_kernel softehl_mortar_23_residual;

@@ -129,4 +129,5 @@ def corner() -> Definition:
     )
     augmented = m.define("trial", lam + rho * gap)
     m.potential(area / (2 * rho) * (sp.Min(augmented, 0) ** 2 - lam**2))
+    m.offer(pseudo_load=True)
     return m.finish()

@@ -87,6 +87,7 @@ CASES = {
     ),
     "section x_ring": film_of(400.0, section="x_ring", groove_width=4.3, housing_diameter=56.4),
     "piston": film_of(400.0, bore=50.0),
+    "gap": film_of(400.0, extrusion_gap=0.2, sealed_pressure=8.0),  # touches the edge
     "thick": film_of(1600.0, viscosity=1e-5),  # nowhere below 20 um
     "thinning": film_of(
         400.0, carreau_stress=0.01, carreau_exponent=0.6, carreau_plateau=0.3, stroke="in"

@@ -10,7 +10,7 @@ PRESSURE_KEY = "sealed_pressure"
 
 LENGTHS = (
     *("section_diameter", "inner_diameter", "rod_diameter", "housing_diameter"),
-    *("groove_width", "groove_centre"),
+    *("groove_width", "groove_centre", "extrusion_gap", "corner_fillet"),
 )
 """Keys of a case that are lengths."""
 

@@ -43,6 +43,8 @@ class FilmCase:
         """Names of the parameters that are not zero."""
         p = self.system.parameters
         values = {name: getattr(p, name) for name in (*NUMBERS, PRESSURE_KEY)} | p.measures
+        if not p.opens:  # without an edge its fillet decides nothing
+            del values["corner_fillet"]
         return (*(name for name, v in values.items() if _varies(v)), SPEED)
 
     def scaled(self, name: str, by: float) -> FilmCase:
