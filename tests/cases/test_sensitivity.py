@@ -85,6 +85,9 @@ CASES = {
     "section rectangular": film_of(
         400.0, section="rectangular", corner_radius=0.4, groove_width=4.3, housing_diameter=56.4
     ),
+    "section d_ring": film_of(
+        400.0, section="d_ring", nose_radius=1.8, groove_width=4.3, housing_diameter=56.4
+    ),
     "section x_ring": film_of(400.0, section="x_ring", groove_width=4.3, housing_diameter=56.4),
     "piston": film_of(400.0, bore=50.0),
     "gap": film_of(400.0, extrusion_gap=0.2, sealed_pressure=8.0),  # touches the edge

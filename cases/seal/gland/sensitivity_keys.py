@@ -14,6 +14,9 @@ LENGTHS = (
 )
 """Keys of a case that are lengths."""
 
+ROOM = 0.01
+"""Share by which each dimension of a section must be free to change for its derivatives."""
+
 NUMBERS = (
     *LENGTHS,
     *(*materials.KEYS, "bulk_modulus"),

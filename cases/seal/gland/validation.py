@@ -10,6 +10,7 @@ from softehl.cases.seal.gland.catalogue import ring_for
 from softehl.cases.seal.gland.records import Discretisation, Gland, Solid
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.sections.section_keys import is_mesh
+from softehl.cases.seal.gland.sensitivity_keys import ROOM
 from softehl.cases.seal.gland.tolerances import read_tolerances
 
 if TYPE_CHECKING:
@@ -152,6 +153,21 @@ def _section_is_one(p: Seal) -> None:
             "sensitivity = true: not of an outline of a file, which has no dimensions, and not "
             "of a section with a cap; leave it out"
         )
+    if p.sensitivity:
+        _require_free_dimensions(p)
+
+
+def _require_free_dimensions(p: Seal) -> None:
+    """Raise ValueError where a dimension of the section is at its limit, and has no derivative."""
+    for name, value in {"section_diameter": p.section_diameter, **p.measures}.items():
+        for by in (1.0 - ROOM, 1.0 + ROOM):
+            try:
+                _ = p.model_copy(update={**p.measures, name: by * value}).free_section
+            except ValueError as error:
+                raise ValueError(
+                    f"sensitivity = true: {name} = {value:g} mm must be free to change by 1 %, "
+                    f"but {by * value:g} mm is refused: {error}; move it away from this limit"
+                ) from error
 
 
 def _seal_is_squeezed(p: Gland) -> None:
