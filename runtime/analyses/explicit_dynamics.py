@@ -42,6 +42,10 @@ _REMEDY = (
     'give contacts a smaller stiffness=..., or take method = "midpoint", which conserves energy, '
     'or "generalised-alpha" with rho_inf = 0, which damps most'
 )
+_OVERLAP, _AT_REST = 0.1, 0.5
+"""Share of the penalty of contacts in the largest internal energy from which bodies overlap instead
+of being deformed, as in rules for codes of impact; where the kinetic energy is at most this share
+of the internal one, as waves pass a soft contact without a loss of pressure."""
 _SHORTER = 2.0  # times: a penalty that shortens stable steps by more is reported
 
 
@@ -51,7 +55,8 @@ class ExplicitMarch:
 
     dt: from result to result. free: what supports and ties leave, and masses there. forces: at the
     state. contact: its unknowns, if there are some. moved: (n,) accelerations of supports at the
-    beginning of the last step, zero elsewhere.
+    beginning of the last step, zero elsewhere. penalty, internal: largest energies of results so
+    far: that of the penalties where bodies are nearly at rest, and the internal one with it.
     """
 
     dt: float
@@ -64,6 +69,8 @@ class ExplicitMarch:
     contact: _ContactUnknowns | None
     moved: Array = field(default_factory=lambda: np.empty(0))
     warned: bool = False
+    penalty: float = 0.0
+    internal: float = 0.0
 
     @classmethod
     def of(
@@ -98,6 +105,7 @@ class ExplicitMarch:
                 end = self._step(end, float(goal), ledger)
             stable = self._stable(end)
             yield self._motion(end, ledger, steps, stable)
+        self._warn_of_overlap()
 
     def _step(self, initial_equations: Problem, t: float, ledger: EnergyBalance) -> Problem:
         """Velocity Verlet: the equations at the end of a step."""
@@ -169,12 +177,30 @@ class ExplicitMarch:
             stacklevel=6,
         )
 
+    def _warn_of_overlap(self) -> None:
+        """Warn where the penalty of contacts, not the bodies, takes much of the energy."""
+        if self.contact is None or not self.penalty > _OVERLAP * self.internal:
+            return
+        warn(
+            f"contact: its penalty holds {self.penalty / self.internal:.0%} of the internal "
+            "energy, as bodies overlap: their contact is too soft; give a larger stiffness=..., or "
+            "finer cells, whose default is stiffer",
+            SoftContact,
+            stacklevel=4,
+        )
+
     def _energies(self, end: Problem, ledger: EnergyBalance) -> dict[str, float]:
         kinetic = 0.5 * float(self.body.lumped_masses @ self.state.v**2)
-        stored = stored_energy(end, self.state.x, self.body.roles)
+        stored, penalty = stored_energy(end, self.state.x, self.body.roles), 0.0
         if self.contact is not None:
-            stored += self.contact.stored_energy(self.forces, self.state.x)
-        return ledger.balance(self.state.t, kinetic, stored, self.forces, self.state.x)
+            penalty = self.contact.stored_energy(self.forces, self.state.x)
+        state, forces = self.state, self.forces
+        energies = ledger.balance(state.t, kinetic, stored + penalty, forces, state.x)
+        penalty = self.body.comm.sum(np.array([penalty])).item()
+        if energies["kinetic"] <= _AT_REST * energies["internal"]:
+            self.penalty = max(self.penalty, penalty)
+        self.internal = max(self.internal, energies["internal"])
+        return energies
 
     def _motion(self, end: Problem, ledger: EnergyBalance, steps: int, stable: float) -> Motion:
         state, size = self.state, float(np.ptp(self.body.static_system.mesh.points, axis=0).max())
@@ -224,6 +250,10 @@ def _require_lumped_masses(body: EquationsOfMotion, problem: Problem) -> None:
                 f'method = "explicit": {name} has no mass everywhere, and explicit steps are '
                 "force over mass; an implicit method can do without"
             )
+
+
+class SoftContact(RuntimeWarning):
+    """The penalty of a contact, not its bodies, takes much of the energy of explicit steps."""
 
 
 class StiffContact(RuntimeWarning):

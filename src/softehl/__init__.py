@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from softehl.runtime.analyses.buckling import Buckling
     from softehl.runtime.analyses.callbacks import Series
     from softehl.runtime.analyses.dynamics import UnbalancedStart
-    from softehl.runtime.analyses.explicit_dynamics import StiffContact
+    from softehl.runtime.analyses.explicit_dynamics import SoftContact, StiffContact
     from softehl.runtime.analyses.homogenisation import Cell, Homogenised
     from softehl.runtime.analyses.motion import EnergyGain, Motion
     from softehl.runtime.analyses.solver_options import SolverOptions
@@ -192,6 +192,7 @@ _PUBLIC = {
     "Silent": "softehl.cases.seal.states.state",
     "SingularMatrix": "softehl.runtime.solve.linear.linear_solver",
     "Solution": "softehl.runtime.solve.solution",
+    "SoftContact": "softehl.runtime.analyses.explicit_dynamics",
     "SolverOptions": "softehl.runtime.analyses.solver_options",
     "Sphere": "softehl.runtime.contact.rigid_surfaces",
     "Status": "softehl.runtime.solve.solution",
@@ -327,6 +328,7 @@ __all__ = [
     "SingularMatrix",
     "SoftehlError",
     "Solution",
+    "SoftContact",
     "SolverOptions",
     "Sphere",
     "Status",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
 import pytest
 
-from softehl import Mesh, Motion, StiffContact, Study, StudyError
+from softehl import Mesh, Motion, SoftContact, StiffContact, Study, StudyError
 from tests.runtime.touching_bodies import elastic
 
 E, RHO, LENGTH, SPEED = 100.0, 1.0, 1.0, 1e-3
@@ -124,6 +125,22 @@ def test_a_stiff_contact_shortens_the_steps_and_stays_stable() -> None:
     assert np.abs(states[-1].velocity("u_x")).max() < 5 * SPEED
     # its impact gains energy, and the balance does not hide it
     assert states[-1].energy["balance"] > 0.1 * states[0].energy["kinetic"]
+
+
+def test_bodies_that_overlap_instead_of_being_pressed_are_reported() -> None:
+    """The default penalty takes a sixth of the energy; a fifth of the static force is missing."""
+    time, force = 20 * LENGTH / WAVE, E / 2 * 0.1 * 0.01
+    found = []
+    for stiffness in (None, 3e3):
+        study = bars(4, stiffness=stiffness)
+        study.fix("left:left", u_x=0, u_y=0)
+        study.fix("right:right", u_x=lambda x, t: np.full(len(x), -0.01 * t / time), u_y=0)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            last = explicit(study, dt=time, until=time)[-1]
+        found.append(-last.reaction("right:right")["u_x"] / force)
+        assert [w.category for w in caught] == ([] if stiffness else [SoftContact])
+    assert found == pytest.approx([0.80, 1.0], abs=0.04)
 
 
 def test_a_start_with_pressures_but_without_penetration_is_refused() -> None:
