@@ -159,7 +159,8 @@ class Adaptation:
         squeeze_film, now = film.start_state
         system, thickness = squeeze_film.system, squeeze_film.scales.thickness
         layout = film_layout(system, now.x, thickness)
-        return self._carried(film, self._system(layout, system.section.density))
+        counts = isinstance(film, Film) and self._fits(film, SHOWS)
+        return self._carried(film, self._system(layout, system.section.density), anew=not counts)
 
     def _coarser(self, film: Film, last: Sequence[Adapted]) -> Film | None:
         """The film on a coarser mesh, for the estimate; None without one."""
@@ -193,11 +194,14 @@ class Adaptation:
         except MeshError:
             return None
 
-    def _carried(self, result: Film | NoFilm, system: SealSystem | None) -> Film | NoFilm | None:
+    def _carried(
+        self, result: Film | NoFilm, system: SealSystem | None, *, anew: bool = True
+    ) -> Film | NoFilm | None:
         """The film on the mesh of a system; None where there is no mesh, or no contact state on it.
 
         It is squeezed out from the contact if none was found, or if the carried one ends. Two of
-        three O-rings that take this have no `ok` at -10 mm/s without it (docs/validation).
+        three O-rings that take this have no `ok` at -10 mm/s without it (docs/validation). anew:
+        whether that is done; not for a film whose mesh shows it already.
         """
         if system is None or result.start_state is None:
             return None
@@ -212,6 +216,6 @@ class Adaptation:
             start, pressures = replace(now, x=transfer.state(now.x)), transfer.pressures(now.x)
             carried = squeeze_film.carried(system, start.x, dry[1])
             again = solver.from_film(carried, start, pressures)
-            if isinstance(again, Film):
+            if isinstance(again, Film) or not anew:
                 return again
         return solver.from_contact(film.stroke, film.speed, dry[1])
