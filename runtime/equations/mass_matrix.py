@@ -128,12 +128,30 @@ def mass_matrix(system: System, problem: Problem, x: Array, densities: Masses | 
     for block in problem.assembler.blocks:
         names = list(block.kernel.parameters)
         if PARAMETER in names and block.name in system.blocks:
-            M = csc_array(M + _of_page(problem, block, x, names.index(PARAMETER)))
+            of_page = _of_page(problem, block, x, names.index(PARAMETER))
+            _require_one_mass(system, block.name, of_page, blocks)
+            M = csc_array(M + of_page)
     if not system.comm.max(float(M.nnz)):
         raise StudyError(
             f"there is no mass: give densities, {_EXAMPLE}, or write accelerations into a page"
         )
     return M
+
+
+def _require_one_mass(
+    system: System, name: str, of_page: csc_array, blocks: Sequence[ElementBlock]
+) -> None:
+    """Raise StudyError where a page has accelerations of unknowns whose mass is given, too."""
+    twice = 0.0
+    for block in blocks:
+        if block.name == f"mass of {name}":
+            twice = float(of_page.diagonal()[block.dofs].any())
+    if system.comm.max(twice):
+        raise StudyError(
+            f"mass of {name!r}: its page has accelerations of these unknowns, and the two would "
+            "add: leave mass out, or the acceleration, or put a mass that is added on a block of "
+            "its own"
+        )
 
 
 def _of_page(problem: Problem, block: ElementBlock, x: Array, column: int) -> csc_array:

@@ -42,13 +42,14 @@ _OPERATORS: dict[type, Callable[..., Any]] = {
 
 @dataclass(frozen=True)
 class Expression:
-    """Arithmetic of names, numbers and functions."""
+    """Arithmetic of names, numbers and functions; `used_by`: what it is given to, for messages."""
 
     text: str
     tree: ast.expr
+    used_by: str = "integral"
 
     @classmethod
-    def of(cls, text: object) -> Expression:
+    def of(cls, text: object, used_by: str = "integral") -> Expression:
         """The expression of a text.  Raises StudyError."""
         if not isinstance(text, str) or not text.strip():
             raise StudyError(f"{text!r}: an expression is a text, such as 'mu / 2 * (I1 - 3)'")
@@ -56,9 +57,14 @@ class Expression:
             tree = ast.parse(text.strip(), mode="eval").body
         except SyntaxError as error:
             raise StudyError(f"{text!r}: {error.msg}") from None
-        expression = cls(text, tree)
+        expression = cls(text, tree, used_by)
         expression._check(tree)
         return expression
+
+    @property
+    def called(self) -> str:
+        """The call that it stands in, for messages."""
+        return f"{self.used_by}({self.text!r})"
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -43,15 +43,15 @@ def mean(result: Result, text: str, where: str | None, block: str | None) -> flo
 
     Raises StudyError, MeshError.
     """
-    expression = Expression.of(text)
+    expression = Expression.of(text, "mean")
     total, volume = _integrate(result, expression, where, block)
     if np.isnan(volume):
         raise StudyError(
-            f"mean({text!r}): {ENERGY!r} alone has no values at points: divide the integral by "
-            "that of '1', or name the energy in the page by m.define"
+            f"{expression.called}: {ENERGY!r} alone has no values at points: divide the integral "
+            "by that of '1', or name the energy in the page by m.define"
         )
     if volume == 0.0:
-        raise StudyError(f"mean({text!r}): there is no volume or area to take a mean over")
+        raise StudyError(f"{expression.called}: there is no volume or area to take a mean over")
     return total / volume
 
 
@@ -61,8 +61,10 @@ def _integrate(
     """Integral and volume; the volume of an energy that has no points is NaN."""
     mesh = result.system.mesh
     if mesh.piece is not None:
-        raise StudyError("integral: the mesh is distributed: integrate with one process")
-    domain = _Domain.of(mesh, where)
+        raise StudyError(
+            f"{expression.called}: the mesh is distributed: integrate with one process"
+        )
+    domain = _Domain.of(mesh, where, expression.used_by)
     if block is None:
         _require_one_meaning(result, expression)
     nodal_names = {*result.system.everywhere.numbering.nodal, *_AXES[: mesh.dimension], "t"}
@@ -85,13 +87,13 @@ class _Domain:
     is_side: bool
 
     @classmethod
-    def of(cls, mesh: Mesh, where: str | None) -> _Domain:
+    def of(cls, mesh: Mesh, where: str | None, used_by: str) -> _Domain:
         """Raises StudyError, MeshError."""
         if where is None or (isinstance(where, str) and where in mesh.groups):
             return cls(where, mesh.cells_of(where), is_side=False)
         if not isinstance(where, str):
             raise StudyError(
-                f"integral: where = {where!r}: a group of cells or a side is named; groups: "
+                f"{used_by}: where = {where!r}: a group of cells or a side is named; groups: "
                 f"{join_names(mesh.groups)}; sides: {join_names(mesh.sides)}"
             )
         return cls(where, mesh.outer_faces(where), is_side=True)
@@ -114,7 +116,7 @@ def _require_one_meaning(result: Result, expression: Expression) -> None:
         for name in sorted({"t", *_AXES[: mesh.dimension]} & faces & set(expression.names)):
             meaning = "the time or load factor" if name == "t" else "a coordinate"
             raise StudyError(
-                f"integral({expression.text!r}): {name!r} is {meaning}, and of block {b.name!r}: "
+                f"{expression.called}: {name!r} is {meaning}, and of block {b.name!r}: "
                 f"block={b.name!r} takes that of the block"
             )
 
@@ -142,7 +144,7 @@ def _over_mesh(result: Result, expression: Expression, domain: _Domain) -> tuple
             nodal = result.values(name)[nodes]
             if np.isnan(nodal[:, : cell.corners]).any():
                 raise StudyError(
-                    f"integral({expression.text!r}): {name!r} is not an unknown everywhere: name a "
+                    f"{expression.called}: {name!r} is not an unknown everywhere: name a "
                     "group of cells, or a block"
                 )
             full = not np.isnan(nodal).any()
@@ -170,7 +172,7 @@ def _over_block(
     points = IntegrationPoints.of(system.mesh, block.kernel, block.kind, nodes, rule)
     if points.shape is None:
         raise StudyError(
-            f"integral({expression.text!r}): the quadrature of {block.name!r} "
+            f"{expression.called}: the quadrature of {block.name!r} "
             f"({block.kernel.name}) is not that of its cells; let its page have a field times "
             "weight and volume, and sum result.fields"
         )
@@ -227,7 +229,7 @@ def _blocks(
 ) -> list[Block]:
     """Blocks of an integral.  Raises StudyError where they are none, or cover a cell twice."""
     every = list(result.system.everywhere.blocks.values())
-    context = f"integral({expression.text!r})"
+    context = expression.called
     if block is not None:
         blocks_of_name = [b for b in every if block in (b.name, _base(b))]
         if not blocks_of_name:

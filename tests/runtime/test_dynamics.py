@@ -130,6 +130,15 @@ def test_the_midpoint_conserves_the_energy_of_a_swinging_beam() -> None:
     assert drift("generalised-alpha", 1) > 1e-4
 
 
+def test_a_mass_beside_that_of_the_page_is_refused() -> None:
+    """They would add; on a block of its own it is added mass."""
+    study = beam(moving, rho=1e-3)
+    with pytest.raises(StudyError, match="mass of 'body': its page has accelerations"):
+        steps(study, dt=1.0, until=1.0, method="newmark", mass=MASS)
+    with pytest.raises(StudyError, match="mass of 'body': its page has accelerations"):
+        study.modes(1, mass=MASS)
+
+
 def test_pressures_need_no_mass() -> None:
     study = Study(Mesh.rectangle(LENGTH, 1.0, cells=(6, 1), order=2))
     study.add("body", mixed, mu=50.0, K=1e6)

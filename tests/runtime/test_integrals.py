@@ -135,6 +135,8 @@ def test_means_are_of_volumes_and_areas() -> None:
     assert result.mean("y", "right") == pytest.approx(volumes, rel=1e-14)
     with pytest.raises(StudyError, match="'energy' alone has no values at points"):
         result.mean("energy")
+    with pytest.raises(StudyError, match=r"^mean\('nu'\): no page has all of nu"):
+        result.mean("nu")
 
 
 def test_the_mean_strain_of_a_bar_is_that_of_its_ends() -> None:
