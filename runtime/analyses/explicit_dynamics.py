@@ -42,10 +42,11 @@ _REMEDY = (
     'give contacts a smaller stiffness=..., or take method = "midpoint", which conserves energy, '
     'or "generalised-alpha" with rho_inf = 0, which damps most'
 )
-_OVERLAP, _AT_REST = 0.1, 0.5
-"""Share of the penalty of contacts in the largest internal energy from which bodies overlap instead
-of being deformed, as in rules for codes of impact; where the kinetic energy is at most this share
-of the internal one, as waves pass a soft contact without a loss of pressure."""
+_OVERLAP, _AT_REST, _SMALL = 0.1, 0.5, 0.1
+"""Share of the penalty of contacts in the internal energy from which bodies overlap, not being
+deformed: contact and bodies are springs in a row, so the same share of a force is missing. It is
+looked at where the kinetic energy is at most half of the internal one, as waves pass a soft contact
+without a loss of pressure, and the internal energy a tenth of its largest one or more."""
 _SHORTER = 2.0  # times: a penalty that shortens stable steps by more is reported
 
 
@@ -55,8 +56,8 @@ class ExplicitMarch:
 
     dt: from result to result. free: what supports and ties leave, and masses there. forces: at the
     state. contact: its unknowns, if there are some. moved: (n,) accelerations of supports at the
-    beginning of the last step, zero elsewhere. penalty, internal: largest energies of results so
-    far: that of the penalties where bodies are nearly at rest, and the internal one with it.
+    beginning of the last step, zero elsewhere. internal: largest internal energy of
+    results so far. warned, soft: whether the user was told of short steps, and of overlap.
     """
 
     dt: float
@@ -69,7 +70,7 @@ class ExplicitMarch:
     contact: _ContactUnknowns | None
     moved: Array = field(default_factory=lambda: np.empty(0))
     warned: bool = False
-    penalty: float = 0.0
+    soft: bool = False
     internal: float = 0.0
 
     @classmethod
@@ -105,7 +106,6 @@ class ExplicitMarch:
                 end = self._step(end, float(goal), ledger)
             stable = self._stable(end)
             yield self._motion(end, ledger, steps, stable)
-        self._warn_of_overlap()
 
     def _step(self, initial_equations: Problem, t: float, ledger: EnergyBalance) -> Problem:
         """Velocity Verlet: the equations at the end of a step."""
@@ -177,16 +177,20 @@ class ExplicitMarch:
             stacklevel=6,
         )
 
-    def _warn_of_overlap(self) -> None:
-        """Warn where the penalty of contacts, not the bodies, takes much of the energy."""
-        if self.contact is None or not self.penalty > _OVERLAP * self.internal:
+    def _warn_of_overlap(self, penalty: float, energies: dict[str, float]) -> None:
+        """Warn once where the penalty of contacts, not the bodies, takes much of the energy."""
+        internal = energies["internal"]
+        self.internal = max(self.internal, internal)
+        at_rest = energies["kinetic"] <= _AT_REST * internal >= _AT_REST * _SMALL * self.internal
+        if self.soft or not at_rest or not penalty > _OVERLAP * internal:
             return
+        self.soft = True
         warn(
-            f"contact: its penalty holds {self.penalty / self.internal:.0%} of the internal "
-            "energy, as bodies overlap: their contact is too soft; give a larger stiffness=..., or "
-            "finer cells, whose default is stiffer",
+            f"contact: t = {self.state.t:.6g}: its penalty holds {penalty / internal:.0%} of the "
+            "internal energy, and as much of the force may be missing: bodies overlap instead of "
+            "being deformed; give a larger stiffness=..., or finer cells, whose default is stiffer",
             SoftContact,
-            stacklevel=4,
+            stacklevel=6,
         )
 
     def _energies(self, end: Problem, ledger: EnergyBalance) -> dict[str, float]:
@@ -196,10 +200,8 @@ class ExplicitMarch:
             penalty = self.contact.stored_energy(self.forces, self.state.x)
         state, forces = self.state, self.forces
         energies = ledger.balance(state.t, kinetic, stored + penalty, forces, state.x)
-        penalty = self.body.comm.sum(np.array([penalty])).item()
-        if energies["kinetic"] <= _AT_REST * energies["internal"]:
-            self.penalty = max(self.penalty, penalty)
-        self.internal = max(self.internal, energies["internal"])
+        if self.contact is not None:
+            self._warn_of_overlap(self.body.comm.sum(np.array([penalty])).item(), energies)
         return energies
 
     def _motion(self, end: Problem, ledger: EnergyBalance, steps: int, stable: float) -> Motion:

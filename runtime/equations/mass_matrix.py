@@ -145,7 +145,7 @@ def _require_one_mass(
     twice = 0.0
     for block in blocks:
         if block.name == f"mass of {name}":
-            twice = float(of_page.diagonal()[block.dofs].any())
+            twice = float(abs(of_page).sum(axis=1)[block.dofs].any())
     if system.comm.max(twice):
         raise StudyError(
             f"mass of {name!r}: its page has accelerations of these unknowns, and the two would "
