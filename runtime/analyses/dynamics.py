@@ -53,7 +53,9 @@ class UnbalancedStart(RuntimeWarning):
     """A motion starts with unknowns without mass, such as pressures, that are in no equilibrium."""
 
 
-_SUPPORT_STEP = 1e-6  # of a step: the initial velocity of supports is a difference over that
+_SUPPORT_STEP, _SUPPORT_STEP_OF_RATES = 1e-6, 1e-3
+"""Of a step: initial velocities of supports are differences over the first, their accelerations
+second ones over the other, which rounding spoils in shorter steps."""
 _CONSISTENT_STEP = 0.1  # of a step: shorter ones find a consistent start, with this error
 _SLOW = 0.01
 """Of the time 1 / w of the fastest motion of the mesh: such short steps move nodes by an error of
@@ -182,7 +184,24 @@ def _consistent_state(
     elif body.comm.max(float(body.algebraic(problem).any())):
         state = _with_massless_equilibrium(body, problem, state, newton)
     problem = body.at_end(state.ended_step(dt), state.v)
-    return replace(state, a=body.initial_accelerations(problem, state.x))
+    moved = _support_accelerations(body, state, problem, dt)
+    return replace(state, a=body.initial_accelerations(problem, state.x, moved))
+
+
+def _support_accelerations(
+    body: EquationsOfMotion, state: MotionState, problem: Problem, dt: float
+) -> Array:
+    """Accelerations (n,) of prescribed values that begin to move, zero elsewhere."""
+    a, step = np.zeros_like(state.x), _SUPPORT_STEP_OF_RATES * dt
+    first, second = (
+        body.static_system.local_problem(
+            Step(state.t + k * step, 1.0, state.x, 0.0, state.v, dt, state.histories)
+        ).values
+        for k in (1, 2)
+    )
+    a[problem.fixed] = (second - 2.0 * first + problem.values) / step**2
+    a[~body.has_mass] = 0.0
+    return a
 
 
 def _constrained_state(

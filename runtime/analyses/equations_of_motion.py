@@ -251,8 +251,11 @@ class EquationsOfMotion:
             replace(step, rate=0.0, rate_offset=v, acceleration=0.0, acceleration_offset=None)
         )
 
-    def initial_accelerations(self, problem: Problem, x: Array) -> Array:
-        """Initial accelerations (n,): M a = -f on free unknowns.  Raises StudyError."""
+    def initial_accelerations(self, problem: Problem, x: Array, moved: Array) -> Array:
+        """Initial accelerations (n,): M a = -f on free unknowns.  Raises StudyError.
+
+        moved: (n,) those of supports, zero elsewhere.
+        """
         forces = Forces.of(problem, x, self.roles)
         free = self.comm.constraints(problem)
         diagonal = free.gather(self.M.diagonal())
@@ -260,14 +263,18 @@ class EquationsOfMotion:
         solution = conjugate_gradients(
             lambda z: free.gather(self.M @ free.expand(z)),
             lambda r: inverse * r,
-            np.where(diagonal > 0.0, -free.gather(forces.total + forces.constraints), 0.0),
+            np.where(
+                diagonal > 0.0,
+                -free.gather(forces.total + forces.constraints + self.M @ moved),
+                0.0,
+            ),
             tolerance=_EXACT,
             max_iterations=_MOST,
             dot=self.comm.dot,
         )
         if not solution.converged:
             raise StudyError("the mass is not positive: no accelerations at the start are found")
-        return free.expand(solution.x)
+        return free.expand(solution.x) + moved
 
     def masked(self, values: Affine) -> Affine:
         """Zero in unknowns without mass, for their velocities and accelerations."""

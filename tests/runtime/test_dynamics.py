@@ -130,6 +130,18 @@ def test_the_midpoint_conserves_the_energy_of_a_swinging_beam() -> None:
     assert drift("generalised-alpha", 1) > 1e-4
 
 
+@pytest.mark.parametrize("method", ["newmark", "generalised-alpha", "midpoint"])
+def test_a_support_that_is_accelerated_begins_with_its_acceleration(method: str) -> None:
+    """Its inertia, and that of the nodes beside it, alternated about the right value before."""
+    study = Study(Mesh.rectangle(1.0, 1.0, cells=(2, 1)))
+    study.add("body", rubber, mu=50.0, lame=50.0)
+    study.fix("left", u_x=lambda x, t: np.full(len(x), 0.005 * t**2), u_y=0)
+    states = steps(study, dt=0.05, until=0.2, method=method, mass=MASS)
+    left = states[0].system.mesh.nodes("left")
+    for state in states:
+        np.testing.assert_allclose(state.acceleration("u_x")[left], 0.01, rtol=1e-5)
+
+
 def test_a_mass_beside_that_of_the_page_is_refused() -> None:
     """They would add; on a block of its own it is added mass."""
     study = beam(moving, rho=1e-3)
