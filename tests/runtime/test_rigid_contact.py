@@ -272,6 +272,7 @@ def test_a_block_slides_where_the_slope_exceeds_the_friction(slope: float) -> No
     assert velocity[1] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore::softehl.SoftContact")
 @pytest.mark.parametrize("surface", [Plane((0, 0), (1, 0)), Sphere((-1, 0.5), 1.0)])
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_an_explicit_impact_keeps_its_energy(surface: Surface, friction: float) -> None:
