@@ -154,7 +154,7 @@ def swinging(method: str, engine: Any) -> dict[str, float]:
     *_, strip = tied().march(dt=0.1, until=0.3, mass=mass, velocity=push, **given)
     study = Study(Mesh.rectangle(4.0, 1.0, cells=(6, 2)))
     study.add("body", moving, rho=1.0, mu=1.0, lam=2.0)
-    study.fix("left", u_x=0, u_y=lambda x, t: np.full(len(x), 0.01 * t))
+    study.fix("left", u_x=0, u_y=lambda x, t: np.full(len(x), 0.01 * t + 0.02 * t**2))
     *_, beam = study.march(dt=0.2, until=0.6, velocity={"u_y": lambda x: 0.02 * x[:, 0]}, **given)
     *_, beam = study.march(dt=0.2, until=1.0, start=beam, **given)
     found: dict[str, float] = {}
