@@ -85,6 +85,11 @@ def read_number(text: str) -> float | int:
         return float(plain.replace(",", "."))
 
 
+def read_fraction(text: str) -> float:
+    """A number, or a whole number and a fraction: "1 3/8", "1-3/8", "3/4"."""
+    return float(sum(map(Fraction, re.split("[ -]", text))))
+
+
 def read_quantity(text: str, unit: str) -> float:
     """The number of a text in `unit`.
 
@@ -93,7 +98,7 @@ def read_quantity(text: str, unit: str) -> float:
     factors, match = _KINDS.get(unit, {unit: 1.0}), _QUANTITY.fullmatch(text)
     spelling = match[2].replace("·", " ").replace("*", " ") if match else ""
     if match and "/" in match[1]:  # a whole number and a fraction: 1 3/8
-        number = float(sum(map(Fraction, re.split("[ -]", match[1]))))
+        number = read_fraction(match[1])
     else:
         number = float(match[1].replace(",", ".")) if match else 0.0
     if (spelling := _spelt(spelling, factors)) in factors:

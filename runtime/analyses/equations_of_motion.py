@@ -293,7 +293,7 @@ def _multipliers(
 ) -> Flags:
     """Unknowns (n,) of pages without mass that stand in no equation without mass, at x, (n,).
 
-    Those of the motion of rigid bodies, which have no mass, are none.
+    Unknowns of the motion of rigid bodies have no mass and are left out.
     """
     massless = ~heavy
     for name in filter(is_motion, system.numbering.layout.names):

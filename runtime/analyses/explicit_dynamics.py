@@ -56,8 +56,8 @@ class ExplicitMarch:
 
     dt: from result to result. free: what supports and ties leave, and masses there. forces: at the
     state. contact: its unknowns, if there are some. moved: (n,) accelerations of supports at the
-    beginning of the last step, zero elsewhere. internal: largest internal energy of
-    results so far. warned, soft: whether the user was told of short steps, and of overlap.
+    beginning of the last step, zero elsewhere. internal: largest internal energy so far.
+    warned, soft: whether the user was told of short steps, and of overlap.
     """
 
     dt: float
@@ -337,7 +337,7 @@ class _ContactUnknowns:
         """Energy of the penalties, p^2 / (2 rho) over the contact, at x, (n,).
 
         Forces p n and -p n at points that are g n apart, times their places, are p g per area.
-        Those of rigid surfaces have no partner.
+        A point on a rigid surface has no partner.
         """
         forces_of_pairs, energy = forces.contact, 0.0
         for contact in self.body.static_system.contacts:

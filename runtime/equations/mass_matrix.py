@@ -142,11 +142,8 @@ def _require_one_mass(
     system: System, name: str, of_page: csc_array, blocks: Sequence[ElementBlock]
 ) -> None:
     """Raise StudyError where a page has accelerations of unknowns whose mass is given, too."""
-    twice = 0.0
-    for block in blocks:
-        if block.name == f"mass of {name}":
-            twice = float(abs(of_page).sum(axis=1)[block.dofs].any())
-    if system.comm.max(twice):
+    dofs = [block.dofs for block in blocks if block.name == f"mass of {name}"]
+    if system.comm.max(float(any(abs(of_page).sum(axis=1)[d].any() for d in dofs))):
         raise StudyError(
             f"mass of {name!r}: its page has accelerations of these unknowns, and the two would "
             "add: leave mass out, or the acceleration, or put a mass that is added on a block of "

@@ -23,7 +23,7 @@ from functools import cache
 from softehl.cases.seal.gland.grooves import INCH, Groove, Kind, gland
 from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.normalise_text import NotUnderstoodError, refused
-from softehl.cases.seal.gland.trade.ring_names import RingName, read_ring
+from softehl.cases.seal.gland.trade.ring_names import RingName, read_ring, size_of
 
 STANDARDS = {"P": "JIS B 2401", "G": "JIS B 2401", "V": "JIS B 2401"}
 """Series -> the standard that it is of, where there is one."""
@@ -144,11 +144,11 @@ def _by_code(text: str, code: str) -> Ring:
         return result[code]
 
     def away(other: str) -> float:
-        return abs(float(other[1:].rstrip("A")) - float(code[1:].rstrip("A")))
+        return abs(size_of(other) - size_of(code))
 
     same = sorted((c for c in (*result, *FRENCH) if c[0] == code[0]), key=away)
     standard = STANDARDS.get(code[0], f"series {code[0]}")
-    forms = sorted(same[:2], key=lambda c: float(c[1:].rstrip("A")))
+    forms = sorted(same[:2], key=size_of)
     raise refused("ring", text, f"is no size of {standard} that is known here", *forms)
 
 

@@ -21,7 +21,7 @@ from softehl.cases.seal.gland.rubbers.materials import KEYS
 from softehl.cases.seal.gland.sections.section_keys import MEASURES, section_of_file
 from softehl.cases.seal.gland.sections.shapes import UCup, parts_of
 from softehl.cases.seal.gland.trade.parse_terms import bands, texts
-from softehl.cases.seal.gland.trade.ring_names import read_ring
+from softehl.cases.seal.gland.trade.ring_names import read_ring, size_of
 
 DIAMETERS = {"rod": "rod_diameter", **{name: key for key, name in OF_PISTON.items()}}
 """Key of a diameter as it is measured -> key that is negative in a piston."""
@@ -166,7 +166,7 @@ def _with_ring(values: dict[str, Any]) -> None:
     if values.get("rod_diameter") is None:
         rod, bore = round(1.02 * ring.inner_diameter, 1), round(ring.outer_diameter, 1)
         if ring_name.code and ring.groove:  # JIS B 2401 names a ring by its rod
-            rod = float(ring_name.code[1:].rstrip("A"))
+            rod = size_of(ring_name.code)
             bore = rod + 2.0 * ring.groove.depth
         raise ValueError(
             f'ring = "{values["ring"]}" needs the rod that it seals, as in rod = {rod:g}, '

@@ -10,8 +10,8 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from dataclasses import dataclass
-from fractions import Fraction
 
+from softehl.cases.harness.units import read_fraction
 from softehl.cases.seal.gland.grooves import INCH
 from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.normalise_text import NUMBER, number_text, plain, refused
@@ -47,7 +47,7 @@ _LIMITS = re.compile(
     r" ?(?:mm|(?P<um>um))?"
 )
 _IN = re.compile(r"(?<=\d) ?(?:in(?:ch(?:es)?)?\b\.?|\"|'')", re.IGNORECASE)
-_FRACTION = re.compile(r"^(?:\d+[ -])?\d+/\d+(?![\d/])")
+_FRACTION = re.compile(r"^(?:\d+[ -])?\d+/[1-9]\d*(?![\d/])")
 _POINT = re.compile(r"(?<![\d.])\.(?=\d)")
 
 
@@ -82,7 +82,7 @@ def read_fit(key: str, size_text: str, *, hole: bool | None = False) -> Band | N
     text, inches = _IN.subn("", text)
     unit = INCH if inches else 1.0
     if inches:
-        text = _POINT.sub("0.", _FRACTION.sub(_decimal, text))
+        text = _POINT.sub("0.", _FRACTION.sub(lambda match: str(read_fraction(match[0])), text))
     if match := _ENDS.fullmatch(text):
         low, high = sorted(unit * float(end) for end in match.groups())
         if 0.9 * high < low:
@@ -108,11 +108,6 @@ def read_fit(key: str, size_text: str, *, hole: bool | None = False) -> Band | N
         usual = f"{size / unit:g} in ±0.002 in" if inches else f"{size:g} ±0.05"
         raise refused(key, size_text, "has limits that are no tolerance of it", usual)
     return Band(size, low, high)
-
-
-def _decimal(match: re.Match[str]) -> str:
-    """A fraction of inches ("1 3/4") as a number with a decimal point."""
-    return str(float(sum(Fraction(part) for part in re.split("[ -]", match[0]))))
 
 
 def band(nominal: float, letter: str, grade: int) -> Band:

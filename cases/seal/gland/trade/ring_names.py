@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from typing import Literal, get_args
 
+from softehl.cases.harness.units import read_fraction
 from softehl.cases.seal.gland.trade.normalise_text import NUMBER, form, plain, refused
 from softehl.cases.seal.gland.trade.rubber_names import read_rubber
 
@@ -106,7 +106,7 @@ _JIS_RUBBERS = {"1A": "NBR 70", "1B": "NBR 90", "4C": "VMQ 70", "4D": "FKM 70"}
 _BS_4518 = form(r"(?P<inner>\d{4})-(?P<section>16|24|30|41|57|84)")
 """Size code of BS 4518: inside diameter and section in tenths of a millimetre."""
 _IN = r"""(?:in(?:ch(?:es)?)?\b\.?|"|'')"""
-_INCHES = rf"((?:\d+[ -])?\d+/\d+|\d*\.?\d+) ?{_IN}?"
+_INCHES = rf"((?:\d+[ -])?\d+/[1-9]\d*|\d*\.?\d+) ?{_IN}?"
 _INCH = form(rf"{_INCHES} ?x ?{_INCHES}(?: ?x ?{_INCHES})?")
 _COMPOUND = form(
     r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM)[ -]?\d\d\b.*)"
@@ -164,11 +164,11 @@ def read_ring(name: str) -> RingName:
             kind=kind,
             iso_class=match["iso_class"] and match["iso_class"].upper(),
         )
+    if ring_name := _by_outside(remainder, kind):
+        return ring_name
     match = (
         None if text.startswith("-") else _SIZE.fullmatch(remainder) or _WORDS.fullmatch(remainder)
     )
-    if ring_name := _by_outside(remainder, kind):
-        return ring_name
     if match:
         sizes = match.groupdict()
         third = sizes.get("third")
@@ -219,7 +219,7 @@ def _in_inches(text: str, kind: Kind | None) -> RingName | None:
     if not match or kind == "u_cup" or not re.search(rf"/|{_IN}", text):
         return None
     texts = [part for part in match.groups() if part]
-    sizes = [float(sum(Fraction(part) for part in re.split(r"[ -]", text_))) for text_ in texts]
+    sizes = [read_fraction(part) for part in texts]
     if len(sizes) == 3 and abs(sizes[1] - sizes[0] - 2.0 * sizes[2]) > 0.02:
         return None
     nominal = "/" in texts[-1]
@@ -237,6 +237,11 @@ def _by_outside(text: str, kind: Kind | None) -> RingName | None:
     inside = (match["word"] or match["word_2"]).lower() in ("id", "inside")
     inner, section = (other, (outer - other) / 2.0) if inside else (outer - 2.0 * other, other)
     return RingName(inner=round(inner, 4), section=round(section, 4), kind=kind)
+
+
+def size_of(code: str) -> float:
+    """The size in the code of a series: 22 of "P22A"."""
+    return float(code[1:].rstrip("A"))
 
 
 def read_section(word: str) -> str:
